@@ -54,6 +54,12 @@ class Scene:
         return tuple(replace(self, garment=piece) for piece in worn) or (self,)
 
     @cached_property
+    def piece(self) -> I32:
+        """To which of the garments (W,) that are worn a vertex of all of them belongs."""
+        counts = [0 if one.garment is None else len(one.garment.vertices) for one in self.pieces]
+        return np.repeat(np.arange(len(counts), dtype=np.int32), counts)
+
+    @cached_property
     def faces(self) -> I32:
         """Faces of the whole surface, body first: (F, 3)."""
         if self.garment is None:

@@ -1,7 +1,7 @@
-"""The layers of a person: body parts and the garment, each with the colours that the tracked surface has shown.
+"""The layers of a person: body parts and garments, each with the colours that the tracked surface has shown.
 
-Left and right limbs share a layer. A layer is a histogram of colours, gathered from the pixels that the posed and
-clothed surface draws it on; layers that look alike are one to the eye and are not told apart.
+Left and right limbs share a layer, and so do the sleeves on them. A layer is a histogram of colours, gathered from the
+pixels that the posed and clothed surface draws it on; layers that look alike are one to the eye and are not told apart.
 """
 
 from __future__ import annotations
@@ -40,12 +40,11 @@ class ColourModel(NamedTuple):
 @memoised
 def layer_of(scene: Scene) -> I32:
     """Return the layer (N,) of each surface vertex: that of the joint that moves it, sides together; cloth is last."""
-    body = scene.body
-    names = [unsided(name) for name in body.joint_names]
-    _, of_joint = np.unique(names, return_inverse=True)
-    cloth = 0 if scene.garment is None else len(scene.garment.vertices)
-    layers = np.concatenate([of_joint[body.main_joint], np.full(cloth, of_joint.max() + 1)])
-    return np.asarray(layers, np.int32)
+    body, garments = scene.body, [piece.garment for piece in scene.pieces if piece.garment is not None]
+    _, of_joint = np.unique([unsided(name) for name in body.joint_names], return_inverse=True)
+    _, of_garment = np.unique([unsided(garment.name) for garment in garments], return_inverse=True)
+    layers = [of_joint[body.main_joint], of_joint.max() + 1 + of_garment[scene.piece]]
+    return np.concatenate(layers, dtype=np.int32)
 
 
 def layer_histograms(
@@ -110,9 +109,9 @@ def garment_log_ratio(past: Past, scene: Scene) -> F64 | None:
     if scene.garment is None or COLOURS not in past.appearance:
         return None
     layers, density = layer_of(scene), colour_model(past).log_density
-    skin = layers[: len(scene.body.vertices)]
+    skin, cloth = np.split(layers, [len(scene.body.vertices)])
     outside = np.bincount(skin, scene.near_garment, len(density)) < 0.5 * np.bincount(skin, minlength=len(density))
-    return density[layers[-1]] - density[outside].max(axis=0) if outside.any() else None
+    return density[np.unique(cloth)].max(axis=0) - density[outside].max(axis=0) if outside.any() else None
 
 
 def densities(counts: F64) -> F64:

@@ -11,7 +11,7 @@ from pydantic import PositiveFloat
 from mocapflow.components import Matcher
 from mocapflow.data import Frame, Matches, Past, Segmentation, Surface, Turn, empty_matches
 from mocapflow.geometry.cameras import magnification, project_each
-from mocapflow.records import F64, Bool
+from mocapflow.records import F64, I32
 from mocapflow.scene import Scene
 from mocapflow_matching.camouflage import without_camouflaged
 from mocapflow_matching.robust import robust_weights
@@ -46,28 +46,34 @@ class InnerContours(Matcher):
         inner = without_camouflaged(segmentation.inner, past)
         image = project_each(surface.vertices[inner.vertex], inner.camera, scene.cameras)
         away = np.einsum("ma,ma->m", inner.pixel - image, inner.direction)
-        worn = surface.cloth[inner.vertex]
-        higher = slipped(away, worn, inner, surface, scene)
+        garment = worn_at(inner.vertex, scene)
+        higher = slipped(away, garment, inner, surface, scene)
         off = np.abs(away - higher) * np.sqrt(inner.weight)
         late, early = (robust_weights(off, loss, self.scale) for loss in ("geman_mcclure", "huber"))
         doubtful = scene.covered.take(inner.vertex) & (self.covered == "near")
         loss = np.where(turn.calm(self.calm_mm) | doubtful, late, early)
-        tell = ~worn if np.count_nonzero(worn) < FEWEST else np.ones(len(worn), bool)
+        tell = np.bincount(garment + 1)[garment + 1] >= np.where(garment < 0, 0, FEWEST)
         return replace(inner, pixel=inner.pixel - higher[:, None] * inner.direction, weight=inner.weight * loss * tell)
 
 
-def slipped(away: F64, worn: Bool, inner: Matches, surface: Surface, scene: Scene) -> F64:
+def worn_at(vertices: I32, scene: Scene) -> I32:
+    """Return to which garment (M,) that is worn a vertex of the surface belongs; -1: it is the body's."""
+    return np.concatenate([np.full(len(scene.body.vertices), -1, np.int32), scene.piece])[vertices]
+
+
+def slipped(away: F64, garment: I32, inner: Matches, surface: Surface, scene: Scene) -> F64:
     """Return by how many px (M,) a waistband is away all around: the median length; pairs of the body are by none.
 
     Args:
         away: (M,) px of each pair, along its direction.
-        worn: (M,) which pairs are of the garment.
+        garment: (M,) of each pair, see `worn_at`.
         inner: the pairs.
         surface: where they are estimated to be.
         scene: the cameras.
     """
-    if not worn.any():
-        return np.zeros(len(worn))
-    place = surface.vertices[inner.vertex[worn]].mean(axis=0)
-    size = np.array([magnification(camera, place) for camera in scene.cameras])[inner.camera]
-    return np.where(worn, size * np.median(away[worn] / size[worn]), 0.0)
+    by = np.zeros(len(away))
+    for worn in (garment == k for k in range(len(scene.pieces)) if (garment == k).any()):
+        place = surface.vertices[inner.vertex[worn]].mean(axis=0)
+        size = np.array([magnification(camera, place) for camera in scene.cameras])[inner.camera[worn]]
+        by[worn] = size * np.median(away[worn] / size)
+    return by

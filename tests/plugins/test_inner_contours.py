@@ -14,16 +14,17 @@ from mocapflow_levelset.inner import SIGMA_PX, findable_edges, inner_contours
 from mocapflow_levelset.inner_edges import inner_edges
 from mocapflow_levelset.layers import COLOURS, colour_model, layer_of
 from mocapflow_matching.contour_icp import ContourIcp
-from mocapflow_matching.inner_contours import InnerContours, slipped
+from mocapflow_matching.inner_contours import InnerContours, slipped, worn_at
 from mocapflow_matching.layered_icp import LayeredIcp, of_another_layer
 from test_layers import CLOTHS, SCENE, SKIN, dressed, learned, painted
 
-from mocapflow.data import CLOTH, Change, Matches, Past, Pose, Turn, empty_matches
+from mocapflow.data import CLOTH, Change, Cloth, Matches, Past, Pose, Turn, empty_matches
 from mocapflow.geometry import twists
 from mocapflow.geometry.cameras import magnification, project
+from mocapflow.geometry.outfits import together
 from mocapflow.geometry.silhouettes import outline
 from mocapflow.pooling import pool
-from mocapflow.testing import tiny_pose, tiny_segmentation
+from mocapflow.testing import tiny_cloth, tiny_pose, tiny_segmentation
 
 ONE, OTHER = SKIN, CLOTHS
 surface_at = partial(matching_scenes.surface_at, scene=SCENE)
@@ -167,9 +168,29 @@ def test_a_slip_is_a_length_so_nearer_cameras_see_more_of_it():
         pixel=np.zeros((2 * count, 2)), direction=np.zeros((2 * count, 2)), weight=np.ones(2 * count),
     )  # fmt: skip
     size = np.array([magnification(c, surface.vertices[garment].mean(axis=0)) for c in (near, far)]).repeat(count)
-    shift = slipped(-0.015 * size, np.ones(2 * count, bool), pairs, surface, scene)
+    shift = slipped(-0.015 * size, np.zeros(2 * count, np.int32), pairs, surface, scene)
     np.testing.assert_allclose(shift, -0.015 * size, rtol=1e-9)
     assert abs(shift[0] / shift[-1]) > 1.2
+
+
+def test_garments_slip_each_by_itself():
+    twice = replace(SCENE, garment=together("both", [SCENE.garment, SCENE.garment]))
+    band, other = SCENE.garment.pinned[:9], len(SCENE.garment.vertices) + SCENE.garment.pinned[:3]
+    vertex = np.concatenate([[0, 1], len(SCENE.body.vertices) + np.concatenate([band, other])]).astype(np.int32)
+    garment = worn_at(vertex, twice)
+    assert garment.tolist() == [-1] * 2 + [0] * 9 + [1] * 3
+    pose, away = leaning(0.0), np.repeat([7.0, 3.0, -2.0], [2, 9, 3])
+    pairs = replace(
+        empty_matches(),
+        camera=np.zeros(14, np.int16), vertex=vertex,
+        pixel=np.zeros((14, 2)), direction=np.zeros((14, 2)), weight=np.ones(14),
+    )  # fmt: skip
+    cloth = tiny_cloth(SCENE, pose).vertices
+    surface = twice.surface(pose, Cloth(vertices=np.concatenate([cloth, cloth]), parameters=np.zeros(6)))
+    np.testing.assert_allclose(slipped(away, garment, pairs, surface, twice), np.where(garment < 0, 0.0, away))
+    segmentation = replace(tiny_segmentation(SCENE, pose), inner=pairs)
+    found = InnerContours().match(painted(dressed, pose), segmentation, surface, Past(), twice, FIRST)
+    assert (found.weight[garment == 1] == 0).all()  # three do not tell a tilt from a height
 
 
 def test_a_few_pairs_of_a_waistband_tell_nothing():

@@ -10,6 +10,7 @@ from mocapflow_levelset.layers import COLOURS, colour_model, garment_log_ratio, 
 from mocapflow_levelset.room_colours import ROOM
 
 from mocapflow.data import BODY, CLOTH, Frame, Past, Turn
+from mocapflow.geometry.outfits import together
 from mocapflow.geometry.visibility import front_vertices
 from mocapflow.testing import tiny_cloth, tiny_frame, tiny_past, tiny_pose, tiny_scene, tiny_segmentation, tiny_state
 
@@ -49,6 +50,29 @@ def test_sides_share_a_layer_and_cloth_is_the_last():
     assert knees[0] == knees[1] and len(knees[0]) == 1
     assert set(layers[SCENE.layer == CLOTH]) == {layers.max()}
     assert layers.max() not in layers[SCENE.layer == BODY]
+
+
+def test_each_garment_is_a_layer_and_sides_share_it():
+    long, sleeves = SCENE.garment, [replace(SCENE.garment, name=f"sleeve_{side}") for side in "lr"]
+    worn, layers = replace(SCENE, garment=together("all", [sleeves[0], long, sleeves[1]])), layer_of(SCENE)
+    found = layer_of(worn)
+    body, count = len(SCENE.body.vertices), len(long.vertices)
+    np.testing.assert_array_equal(found[:body], layers[:body])
+    np.testing.assert_array_equal(found[body:] - found[:body].max(), np.repeat([1, 2, 1], count))
+
+
+def test_the_colours_of_several_garments_are_all_the_garment_s():
+    """A part that has a garment's colour and lies outside of it takes that colour away, and no other."""
+    worn = replace(SCENE, garment=together("both", [SCENE.garment, replace(SCENE.garment, name="apron")]))
+    colours = [SKIN, CLOTHS, (20, 200, 20)]
+    skin, cloth, apron = (int(bins_of(np.array(colour, np.uint8))) for colour in colours)
+    counts = np.zeros((layer_of(worn).max() + 1, BINS))
+    counts[:-2, skin], counts[-1, cloth], counts[-2, apron] = 1000, 1000, 1000
+    told = garment_log_ratio(Past(appearance={COLOURS: counts}), worn)
+    assert told[cloth] > 2 and told[apron] > 2 and told[skin] < -2
+    counts[layer_of(worn)[SCENE.body.vertices[:, 2].argmin()], apron] = 1000  # a sock
+    told = garment_log_ratio(Past(appearance={COLOURS: counts}), worn)
+    assert told[cloth] > 2 and told[apron] < 1
 
 
 def test_a_layer_has_the_colours_that_it_is_drawn_on():
