@@ -16,7 +16,7 @@ class Outfit(Garment):
     """Garments that are sewn, draped and fitted each by itself, and seen together; they do not touch each other."""
 
     name: ClassVar[str] = "outfit"
-    garments: Annotated[tuple[Garment, ...], Field(min_length=1)]
+    garments: Annotated[tuple[Garment, ...], Field(min_length=1)]  # what is worn, each with its settings
 
     def sew(self, body: Body) -> GarmentMesh:
         """Return all of them on the rest body."""
