@@ -1,22 +1,25 @@
-"""Skirts and shorts for `known_motion.py`: a cone about the trunk of a rest body, and one that ends in two tubes.
+"""Garments for `known_motion.py`: cones about the trunk and the arms of a rest body, and shorts that end in two tubes.
 
 What is sewn has the measured circumferences and lengths wherever the body leaves room; it lies outside of the body.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from known_poses import Body
 from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
 
 BAND = 0.03  # m, height of a waistband
 OFF_SKIN, TIGHT = 0.010, 0.004  # m, between skin and sewn cloth, and under the waistband
 TRUNK, THIGH = ("pelvis", "spine", "chest", "hip", "knee"), ("hip", "knee", "pelvis")
+ARM = ("shoulder", "elbow", "wrist")
 SKIRT_COLUMNS, SKIRT_ROWS = 72, 50
 SHORTS_COLUMNS, SHORTS_ROWS, UNDER, LEG_COLUMNS, LEG_ROWS = 76, 17, 11, 50, 24
+SLEEVE_COLUMNS, SLEEVE_ROWS = 40, 26
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,9 @@ def measures_for(body: Body, own: dict[str, Any], owner: Body) -> dict[str, Any]
 
 
 def sew(body: Body, measures: dict[str, Any]) -> Garment:
-    """Sew a skirt or shorts by their measures; the waistband is pinned."""
+    """Sew a skirt, shorts or a sleeve by their measures; the band at the upper edge is pinned."""
+    if measures["type"] == "cylinder":
+        return _sleeve(body, measures)
     if measures["type"] == "skirt":
         columns, rows, wide, length = SKIRT_COLUMNS, SKIRT_ROWS, measures["hem_circumference"], measures["length"]
     else:
@@ -56,6 +61,43 @@ def sew(body: Body, measures: dict[str, Any]) -> Garment:
     return Garment(points, quads, np.arange(2 * columns), column % 4 < 2)
 
 
+def together(pieces: list[Garment]) -> Garment:
+    """Return pieces as one cloth, whose vertices and quads are theirs in turn."""
+    first = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
+    return Garment(
+        np.concatenate([piece.vertices for piece in pieces]),
+        np.concatenate([piece.quads + k for piece, k in zip(pieces, first, strict=False)]),
+        np.concatenate([piece.pinned + k for piece, k in zip(pieces, first, strict=False)]),
+        np.concatenate([piece.stripe for piece in pieces]),
+    )
+
+
+def _sleeve(body: Body, measures: dict[str, Any]) -> Garment:
+    """Sew a straight tube around the upper arm's axis, as if the arm hung down, all of one colour."""
+    shoulder, elbow = (body.joint(name + measures["joint"][-2:]) for name in ARM[:2])
+    hang, bone = Rotation.align_vectors([[0, 0, -1]], [elbow - shoulder])[0], np.linalg.norm(elbow - shoulder)
+    own = (body.vertices[:, 0] * shoulder[0] > 0)[body.faces].all(1)
+    hung = replace(body, vertices=hang.apply(body.vertices - shoulder), faces=body.faces[own])
+    reach = goal = measures["length"] - BAND
+    for _ in range(3):
+        rings = _sleeve_rings(hung, measures, -measures["start"] * bone, reach)
+        reach *= goal / np.linalg.norm(np.diff(rings[1:], axis=0), axis=2).sum(0).mean()
+    quads = _tube(np.arange(SLEEVE_ROWS * SLEEVE_COLUMNS).reshape(SLEEVE_ROWS, SLEEVE_COLUMNS))
+    points = hang.inv().apply(np.concatenate(rings)) + shoulder
+    return Garment(points, quads, np.arange(2 * SLEEVE_COLUMNS), np.ones(len(quads), bool))
+
+
+def _sleeve_rings(hung: Body, measures: dict[str, Any], top: float, reach: float) -> list[np.ndarray]:
+    """Return rings (N,3) about a hanging arm's axis: a band, then evenly down as far as asked."""
+    rings: list[np.ndarray] = []
+    ends = [measures["upper_circumference"], measures["lower_circumference"]]
+    for down in (0.0, *np.linspace(BAND, BAND + reach, SLEEVE_ROWS - 1)):
+        z, shape = top - down, rings[0][:, :2] if len(rings) > 1 else None
+        girth = float(np.interp(down, [0, BAND + reach], ends))
+        rings.append(_ring(_outline(hung, z, ARM), z, girth, SLEEVE_COLUMNS, shape, np.zeros(2)))
+    return rings
+
+
 def _cone(body: Body, measures: dict[str, Any], wide: float, length: float, columns: int, rows: int) -> np.ndarray:
     """Return points of a cone from the waist down whose columns are as long as asked."""
     step = goal = (length - BAND) / (rows - 2)
@@ -67,20 +109,28 @@ def _cone(body: Body, measures: dict[str, Any], wide: float, length: float, colu
 
 def _rings(body: Body, top: float, waist: float, wide: float, columns: int, rows: int, step: float) -> list[np.ndarray]:
     """Return rings (N,3): a waistband, then rings about a step apart along the cloth."""
-    rings = [_ring(body, top, waist, columns), _ring(body, top - BAND, waist, columns)]
+    rings = [_ring(_outline(body, z, TRUNK), z, waist, columns) for z in (top, top - BAND)]
     down, shape = step, rings[0][:, :2] - rings[0][:, :2].mean(0)
     for share in np.arange(1, rows - 1) / (rows - 2):
-        rings.append(_ring(body, rings[-1][0, 2] - down, waist + share * (wide - waist), columns, shape))
+        z = rings[-1][0, 2] - down
+        rings.append(_ring(_outline(body, z, TRUNK), z, waist + share * (wide - waist), columns, shape))
         aside = np.linalg.norm(rings[-1][:, :2] - rings[-2][:, :2], axis=1).mean()
         down = np.sqrt(max(0.2 * step**2, step**2 - aside**2))
     return rings
 
 
-def _ring(body: Body, z: float, girth: float, count: int, shape: np.ndarray | None = None) -> np.ndarray:
-    """Return points (N,3) from the front to the left, of a shape (M,2) as long as asked, but outside of the body."""
-    hull = _outline(body, z, TRUNK)
+def _ring(
+    hull: np.ndarray,
+    z: float,
+    girth: float,
+    count: int,
+    shape: np.ndarray | None = None,
+    middle: np.ndarray | None = None,
+) -> np.ndarray:
+    """Return points (N,3) from the front to the left, of a shape (M,2) as long as asked, but outside of the body's."""
     least = _widened(hull, TIGHT if shape is None else OFF_SKIN)
-    middle, shape = (hull.max(0) + hull.min(0)) / 2, least - least.mean(0) if shape is None else shape
+    middle = (hull.max(0) + hull.min(0)) / 2 if middle is None else middle
+    shape = least - least.mean(0) if shape is None else shape
     scale = girth / _length(shape)
     for _ in range(8):
         both = np.vstack([middle + scale * shape, least])

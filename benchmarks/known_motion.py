@@ -8,7 +8,7 @@ truth. The body is posed in `known_poses.py`, by a motion of DATA or of `known_s
 of the lens and noise of the sensor are added here. Nothing of the tracker takes part, its kinematics neither: what
 shared code with it could not tell that it is wrong. On one core about 2 s a view: 8 minutes a take of 50 frames.
 OUT/room_A and so on keep the empty rooms for the next take; delete them when the room, the light or the cameras here
-have changed. Where a leg has come through the cloth, which the simulation does not prevent, the take's README says so.
+have changed. Where a limb has come through the cloth, which the simulation does not prevent, the take's README says so.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import open3d as o3d
-from known_garments import measures_for, sew
+from known_garments import ARM, measures_for, sew, together
 from known_poses import RATE, Body, Motion, angles, chain, ground, read_body, skin
 from known_rigs import RIGS
 from known_scripts import SCRIPTS
@@ -39,13 +39,14 @@ TONE = 0.965  # of a frame to its clean plate, as in the shared recordings
 SOFTNESS_PX, NOISE = 0.7, 3.0
 SKIN, HAIR, UNDERWEAR = (0.56, 0.33, 0.21), (0.05, 0.035, 0.03), (0.10, 0.10, 0.12)
 SHIRT, SOCKS = {"A": (0.16, 0.33, 0.60), "B": (0.55, 0.10, 0.10)}, {"A": (0.80, 0.80, 0.80), "B": (0.03, 0.03, 0.035)}
+LEG = ("hip", "knee", "ankle")
 RECORDINGS, OWNER = {"A": "walk_skirt", "B": "kneeup_shorts"}, {"skirt": "A", "shorts": "B"}
 
 
 ABOUT = """# {name}
 
 Rendered recording of known motion: {take.frames} frames at {rate:g} a second, subject {take.subject},
-motion {take.motion} from its frame {take.start}, {take.garment} simulated with Blender's cloth. Made by
+motion {take.motion} from its frame {take.start}, {take.worn} simulated with Blender's cloth. Made by
 `benchmarks/known_motion.py`. Format and conventions are those of the recording of the same subject, whose body this is;
 the cameras are {cameras}; frames are {tone:g} times as bright as the clean plates.
 """
@@ -123,19 +124,24 @@ def prepare(take: Take, data: Path, out: Path) -> None:
     if own != owners:
         measures = measures_for(body, measures, read_body(owners / "subject"))
     measures |= take.cut
-    (out / "subject/garment.json").write_text(json.dumps(measures, indent=1))
+    sleeves = [{"type": "cylinder", "joint": f"shoulder_{s}", **take.sleeves} for s in "lr" if take.sleeves]
+    worn, plain = [measures, *sleeves], (SHIRT[take.subject], SHIRT[take.subject])
+    (out / "subject/garment.json").write_text(json.dumps(worn if sleeves else measures, indent=1))
     whole, first = build_motion(take, body, data, centre, cameras)
     motion = Motion(whole.translation[first:], whole.rotations[first:])
     (out / "init.json").write_text(json.dumps(disturbed(body, motion, take.seed), indent=1))
     write_truth(body, chain(body, motion)[1], out / "truth")
-    garment = sew(body, measures)
+    pieces = [sew(body, piece) for piece in worn]
+    garment, looks = together(pieces), [take.stripes, *(plain for _ in sleeves)]
+    colours = [np.where(p.stripe[:, None], *look) for p, look in zip(pieces, looks, strict=True)]
+    touching = [np.full(len(p.vertices), of["type"] != "shorts") for p, of in zip(pieces, worn, strict=True)]
     np.savez(
         out / "work/scene.npz", first=first, plates=PLATES,
         room=json.dumps(asdict(take.place)), cameras=json.dumps(cameras),
         body=skin(body, whole).astype("f4"), faces=body.faces, paint=painted(body, take.subject),
-        garment=carried(body, garment.vertices, garment.pinned, whole).astype("f4"), quads=garment.quads,
-        pinned=garment.pinned, cloth_paint=np.where(garment.stripe[:, None], *take.stripes),
-        self_collision=take.garment == "skirt",
+        garment=np.concatenate([carried(body, p.vertices, p.pinned, whole) for p in pieces], axis=1).astype("f4"),
+        quads=garment.quads, pinned=garment.pinned, cloth_paint=np.concatenate(colours),
+        self_collision=np.concatenate(touching),
     )  # fmt: skip
 
 
@@ -176,7 +182,7 @@ def painted(body: Body, subject: str) -> np.ndarray:
 
 
 def carried(body: Body, cloth: np.ndarray, pinned: np.ndarray, motion: Motion) -> np.ndarray:
-    """Return cloth (T,C,3) moved rigidly as the skin next to its waistband moves."""
+    """Return cloth (T,C,3) moved rigidly as the skin next to its pinned band moves."""
     belt = cKDTree(body.vertices).query(cloth[pinned])[1]
     middle, result = body.vertices[belt].mean(0), []
     for places in skin(body, motion, belt):
@@ -191,11 +197,12 @@ def finish(take: Take, out: Path, room: Path) -> None:
     faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]).astype("i4")
     cloth, joints = np.load(out / "work/cloth.npy"), np.load(out / "truth/joints.npz")
     np.savez_compressed(out / "truth/cloth.npz", vertices=cloth, faces=faces)
-    legs = zip(cloth, joints["positions"], strict=True)
-    if wrong := sum(pierced(sheet, places, faces, list(joints["names"])) for sheet, places in legs):
-        told = f"A leg comes through the cloth in {wrong} of {len(cloth)} frames: the simulation has failed."
-        (out / "README.md").write_text((out / "README.md").read_text() + "\n" + told + "\n")
-        print(told)
+    names, poses = list(joints["names"]), list(zip(cloth, joints["positions"], strict=True))
+    for limb, parts in [("A leg", LEG), ("An arm", ARM)][: 1 + bool(take.sleeves)]:
+        if wrong := sum(pierced(sheet, places, faces, names, parts) for sheet, places in poses):
+            told = f"{limb} comes through the cloth in {wrong} of {len(cloth)} frames: the simulation has failed."
+            (out / "README.md").write_text((out / "README.md").read_text() + "\n" + told + "\n")
+            print(told)
     for camera, boxes in json.loads((out / "work/boxes.json").read_text()).items():
         empty = np.stack([cv2.imread(str(room / f"{camera}_{k}.png")) for k in range(PLATES)]).astype("f4")
         cv2.imwrite(str(out / f"background/{camera}.png"), _soft(empty.mean(0)).round().astype("u1"))
@@ -209,12 +216,14 @@ def finish(take: Take, out: Path, room: Path) -> None:
         write_video(out / f"videos/{camera}.mp4", np.stack(pictures))
 
 
-def pierced(cloth: np.ndarray, positions: np.ndarray, faces: np.ndarray, names: list[str]) -> bool:
-    """Return whether a leg, as a line through its joint centres (J,3), passes through the cloth (C,3), as none can."""
+def pierced(
+    cloth: np.ndarray, positions: np.ndarray, faces: np.ndarray, names: list[str], parts: tuple[str, ...] = LEG
+) -> bool:
+    """Return whether a limb, as a line through its joint centres (J,3), passes through the cloth (C,3), as none can."""
     sheet = o3d.t.geometry.RaycastingScene()
     sheet.add_triangles(np.ascontiguousarray(cloth, "f4"), np.ascontiguousarray(faces, "u4"))
-    legs = [[positions[names.index(part + side)] for part in ("hip", "knee", "ankle")] for side in ("_l", "_r")]
-    ways = np.array([[*a, *(b - a)] for leg in legs for a, b in zip(leg, leg[1:], strict=False)])
+    limbs = [[positions[names.index(part + side)] for part in parts] for side in ("_l", "_r")]
+    ways = np.array([[*a, *(b - a)] for limb in limbs for a, b in zip(limb, limb[1:], strict=False)])
     far = ways + np.pad(ways[:, 3:], ((0, 0), (0, 3)))  # from the lower end on
     counts = sheet.count_intersections(np.concatenate([ways, far]).astype("f4")).numpy()
     return bool((counts[: len(ways)] != counts[len(ways) :]).any())

@@ -40,7 +40,7 @@ def add_mesh(name: str, vertices: np.ndarray, faces: np.ndarray) -> Any:
 
 
 def drape(scene: dict[str, np.ndarray]) -> np.ndarray:
-    """Return the garment (T,C,3), pinned at its waistband, draped on the moving body, from frame 0 on."""
+    """Return the garment (T,C,3), pinned at its bands, draped on the moving body, from frame 0 on."""
     bodies, faces, pinned, targets = (scene[k] for k in ("body", "faces", "pinned", "garment"))
     targets[0] = lifted(targets[0], bodies[0], faces, pinned, 2 * GAP)[0]
     body, garment = add_mesh("body", bodies[0], faces), add_mesh("garment", targets[0], scene["quads"])
@@ -49,7 +49,9 @@ def drape(scene: dict[str, np.ndarray]) -> np.ndarray:
     body.modifiers.new("collision", "COLLISION")
     body.collision.thickness_outer, body.collision.cloth_friction = GAP, 5.0
     garment.vertex_groups.new(name="pins").add(pinned.tolist(), 1.0, "REPLACE")
-    set_up_cloth(garment.modifiers.new("cloth", "CLOTH"), bool(scene["self_collision"]), len(targets))
+    apart = np.flatnonzero(~scene["self_collision"])  # these pass through each other
+    garment.vertex_groups.new(name="apart").add(apart.tolist(), 1.0, "REPLACE")
+    set_up_cloth(garment.modifiers.new("cloth", "CLOTH"), len(apart) < len(targets[0]), len(targets))
     draped, inside, places = [], [], np.empty(targets[0].size)
     for frame, skin in enumerate(bodies):
         bpy.context.scene.frame_set(frame + 1)
@@ -81,6 +83,7 @@ def set_up_cloth(cloth: Any, self_collision: bool, frames: int) -> None:
     fabric.shear_stiffness, fabric.bending_stiffness = 20.0, 0.3
     touch.collision_quality, touch.distance_min, touch.friction = 8, 0.004, 3.3
     touch.use_self_collision, touch.self_distance_min = self_collision, 0.003
+    touch.vertex_group_self_collisions = "apart"
     bpy.context.scene.frame_start = cloth.point_cache.frame_start = 1
     bpy.context.scene.frame_end = cloth.point_cache.frame_end = frames
 

@@ -15,6 +15,11 @@ WIDE = {"length": 0.60, "hem_circumference": 2.4}
 CULOTTES = {"length": 0.68, "inseam": 0.44, "leg_opening_circumference": 0.66}
 TROUSERS = {"length": 0.90, "inseam": 0.66, "leg_opening_circumference": 0.48}
 SLACKS = {**TROUSERS, "length": 0.84, "inseam": 0.60}  # above a shorter wearer's ankles
+# of a wide blouse: they end in the middle of the forearm
+SLEEVES = {
+    "A": {"start": 0.25, "upper_circumference": 0.34, "lower_circumference": 0.52, "length": 0.30},
+    "B": {"start": 0.30, "upper_circumference": 0.38, "lower_circumference": 0.58, "length": 0.30},
+}
 WHOLE = 2000  # px, more than a picture: on a floor of one colour it shows where a picture was pasted in
 
 
@@ -56,6 +61,7 @@ class Take:
     frames: int = 50
     flight: tuple[int, int] | None = None  # frames of take-off and landing
     cut: dict[str, float] = field(default_factory=dict)  # m, measures in which the garment differs from its owner's
+    sleeves: dict[str, float] = field(default_factory=dict)  # of the garment `cylinder`: share of the arm, and m
     room: str = ""  # one of `ROOMS`; if empty, the one that is named like the subject
     rig: str = ""  # one of `known_rigs.RIGS`; if empty, the cameras of the subject's recording
 
@@ -63,6 +69,11 @@ class Take:
     def place(self) -> Room:
         """The room."""
         return ROOMS[self.room or self.subject]
+
+    @property
+    def worn(self) -> str:
+        """What is worn, in words."""
+        return self.garment + (" and two sleeves" if self.sleeves else "")
 
     @property
     def plates(self) -> str:
@@ -137,6 +148,9 @@ TAKES = {
     "scissors_B_shorts": Take("B", "shorts", "scissors", 141, PURPLE),
     "scissors_A_skirt": Take("A", "skirt", "scissors", 142, GREEN),
     "sit_B_skirt": Take("B", "skirt", "sit", 134, PURPLE, frames=60),
+    # and a wide blouse's sleeves
+    "dance_A_sleeves": Take("A", "skirt", "dance", 151, GREY, frames=40, sleeves=SLEEVES["A"]),
+    "lunge_B_sleeves": Take("B", "shorts", "lunge", 152, PURPLE, frames=40, sleeves=SLEEVES["B"]),
     # other rooms: white, and of the colour of skin
     "walk_A_studio": Take("A", "skirt", "walk_A", 121, GREEN, start=150, frames=40, room="studio"),
     "kneeup_B_studio": Take("B", "shorts", "kneeup_B", 123, PURPLE, start=140, frames=24, room="studio"),

@@ -12,8 +12,8 @@ ROOT = Path(__file__).parents[1]
 sys.path.append(str(ROOT / "benchmarks"))
 
 import known_motion as made  # noqa: E402
-from known_garments import measures_for, sew  # noqa: E402
-from known_takes import GREY, Take  # noqa: E402
+from known_garments import ARM, measures_for, sew, together  # noqa: E402
+from known_takes import GREY, SLEEVES, Take  # noqa: E402
 
 SKIRT, SHORTS = ROOT / "examples/data/skirt_steps", ROOT / "examples/data/shorts_steps"
 
@@ -110,6 +110,37 @@ def test_garments_have_their_measures(wearer):
             hem = garment.vertices[-50:]
             assert lengths(hem) == pytest.approx(measures["leg_opening_circumference"], rel=0.02)
             assert along == pytest.approx(measures["length"] - measures["inseam"], rel=0.03)
+
+
+@pytest.mark.parametrize(("wearer", "subject"), [(SKIRT, "A"), (SHORTS, "B")], ids=["hers", "his"])
+def test_sleeves_have_their_measures_and_are_around_the_arms(wearer, subject):
+    body, measures = made.read_body(wearer / "subject"), {"type": "cylinder", **SLEEVES[subject]}
+    skin = made.o3d.t.geometry.RaycastingScene()
+    skin.add_triangles(body.vertices.astype("f4"), body.faces.astype("u4"))
+    for side in ("_l", "_r"):
+        sleeve = sew(body, {**measures, "joint": "shoulder" + side})
+        rings = sleeve.vertices.reshape(26, 40, 3)
+        assert lengths(rings[0]) == pytest.approx(measures["upper_circumference"], rel=0.02)
+        assert lengths(rings[-1]) == pytest.approx(measures["lower_circumference"], rel=0.02)
+        along = np.linalg.norm(np.diff(rings, axis=0), axis=2).sum(0).mean()
+        assert along == pytest.approx(measures["length"], rel=0.03)
+        shoulder, elbow = body.joint("shoulder" + side), body.joint("elbow" + side)
+        pinned = shoulder + measures["start"] * (elbow - shoulder)
+        np.testing.assert_allclose(rings[0].mean(0), pinned, atol=0.02)
+        assert skin.compute_signed_distance(sleeve.vertices.astype("f4")).numpy().min() > 0.002  # outside
+
+
+def test_an_arm_that_comes_through_one_of_two_sleeves_is_told():
+    body, measures = made.read_body(SKIRT / "subject"), {"type": "cylinder", **SLEEVES["A"]}
+    both = together([sew(body, {**measures, "joint": joint}) for joint in ("shoulder_l", "shoulder_r")])
+    half = len(both.vertices) // 2
+    assert set(both.quads[len(both.quads) // 2 :].ravel()) == set(range(half, 2 * half))
+    assert set(both.pinned) == {*range(80), *range(half, half + 80)}
+    faces = np.concatenate([both.quads[:, [0, 1, 2]], both.quads[:, [0, 2, 3]]])
+    assert not made.pierced(both.vertices, body.joints, faces, body.names, ARM)
+    bent = at_rest(body)
+    bent.rotations[0, body.names.index("elbow_l"), 0] = -np.pi / 2
+    assert made.pierced(both.vertices, made.chain(body, bent)[1][0], faces, body.names, ARM)
 
 
 @pytest.mark.long
