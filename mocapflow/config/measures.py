@@ -154,7 +154,7 @@ def _wrong_measure(error: MocapflowError, recorded: RecordedGarment, by_file_alo
     source = f"describes a {recorded.kind}" if recorded.kind else "does not exist"
     note = f"measures, in metres, come from {recorded.file}, which {source}; a value in the pipeline overrides them"
     setting = next((name for name in recorded.written if error.message.startswith(f"garment.{name}: ")), "")
-    message, where = error.message, str(recorded.file) if by_file_alone else error.where
+    message, where = error.message, recorded.place(str(recorded.kind)) if by_file_alone else error.where
     if setting:
         key, _ = recorded.written[setting]
         message, where = message.replace(setting, key, 1), recorded.place(key)

@@ -120,6 +120,13 @@ def test_what_is_wrong_is_told_with_its_line(clip):
     assert caught.value.where == f"{file}:{line + 1}:4"
 
 
+def test_a_garment_that_lacks_a_measure_is_told_with_its_line(clip):
+    write(clip, [SLEEVE, {"type": "skirt", "length": 0.7}])
+    with pytest.raises(MocapflowError, match="skirt needs waist_height_m") as caught:
+        recorded_garment(clip, REGISTRY)
+    assert caught.value.where == f"{clip / 'subject' / 'garment.json'}:9:12"
+
+
 @pytest.mark.parametrize("said", [[], [SKIRT, 3], [SKIRT, {"length": 0.3}], "skirt"])
 def test_what_is_no_garment(clip, said):
     write(clip, said)
