@@ -93,7 +93,10 @@ class PoseSolver(Component):
 
 
 class ClothFitter(Component):
-    """Chooses the cloth parameters and forces that explain the images."""
+    """Chooses the cloth parameters and forces that explain the images.
+
+    `GarmentMesh.columns` finds parameters by what they mean: where several garments are worn, each has its own.
+    """
 
     role: ClassVar[str] = "cloth_fitter"
 

@@ -44,7 +44,8 @@ def garment_of(value: Any, recording: Path, resolver: Resolver) -> Garment | Non
     """Return the garment that a pipeline names, None without one; several that are worn at once are an outfit.
 
     Args:
-        value: what the file says: a name, `from_recording`, or {use: name, setting: value}.
+        value: what the file says: a name, `from_recording`, or {use: name, setting: value}. An `outfit` that does not
+            say its `garments` is from the recording, too.
         recording: the folder whose subject/garment.json holds the measures.
         resolver: of the file.
 
@@ -55,7 +56,9 @@ def garment_of(value: Any, recording: Path, resolver: Resolver) -> Garment | Non
         return None
     file = recording / FILE
     recorded = _read_recorded(file, resolver.registry)
-    if _named(value) != FROM_RECORDING and value != OUTFIT:
+    if not _is_recorded(value):
+        if _named(value) == OUTFIT:  # says all measures itself
+            return resolver.component("garment", value, ("garment",))  # type: ignore[no-any-return]
         described = next((one for one in recorded if one.kind == _named(value)), None)
         other = recorded[0]._replace(written={}) if recorded else RecordedGarment(file)
         return _garment(value, described or other, resolver)
@@ -119,7 +122,7 @@ def wearer(recording: Path, registry: Registry) -> tuple[Body, bool]:
 
 def place_of(value: Any, recording: Path, resolver: Resolver) -> str:
     """Return where the measures of a garment are written: in the recording, or as file:line:column."""
-    return str(recording / FILE) if _named(value) == FROM_RECORDING else resolver.place(("garment",))
+    return str(recording / FILE) if _is_recorded(value) else resolver.place(("garment",))
 
 
 def own_places(value: Any, resolver: Resolver) -> dict[str, str]:
@@ -130,6 +133,11 @@ def own_places(value: Any, resolver: Resolver) -> dict[str, str]:
 
 def _named(value: Any) -> Any:
     return value.get("use") if isinstance(value, dict) else value
+
+
+def _is_recorded(value: Any) -> bool:
+    """Return whether the recording says what is worn."""
+    return _named(value) == FROM_RECORDING or (_named(value) == OUTFIT and "garments" not in value)
 
 
 def _no_garment(file: Path) -> RecordingError:
@@ -146,7 +154,7 @@ def _wrong_measure(error: MocapflowError, recorded: RecordedGarment, by_file_alo
     source = f"describes a {recorded.kind}" if recorded.kind else "does not exist"
     note = f"measures, in metres, come from {recorded.file}, which {source}; a value in the pipeline overrides them"
     setting = next((name for name in recorded.written if error.message.startswith(f"garment.{name}: ")), "")
-    message, where = error.message, str(recorded.file) if by_file_alone else error.where
+    message, where = error.message, recorded.place(str(recorded.kind)) if by_file_alone else error.where
     if setting:
         key, _ = recorded.written[setting]
         message, where = message.replace(setting, key, 1), recorded.place(key)
@@ -171,6 +179,9 @@ def _read_recorded(path: Path, registry: Registry) -> list[RecordedGarment]:
 def _described(empty: RecordedGarment, said: dict[str, Any], registry: Registry) -> RecordedGarment:
     """Return a garment with its kind and measures."""
     kind = str(said["type"])
+    if kind == OUTFIT:
+        hint = '[{"type": "skirt", ...}, {"type": "cylinder", ...}]'
+        raise RecordingError("several garments are written as a list of them", where=empty.place(kind), hint=hint)
     known = {setting for cls in registry.provided("garment").get(kind, []) for setting in cls.model_fields}
     written: dict[str, tuple[str, Any]] = {}
     for key, value in said.items():

@@ -103,7 +103,7 @@ def velocity_of(draper: Draper, pose: Pose, parameters: F64, vertices: I32, past
         InvalidOutput: they are of another shape, or not finite.
     """
     if len(scene.pieces) == 1:
-        return _told(draper, pose, parameters, vertices, past, scene)
+        return _told(draper, pose, parameters, vertices, past, scene.pieces[0])
     unknowns = np.arange(6 + len(pose.angles) + len(parameters))
     pose_columns, cloth_columns = np.split(unknowns, [6 + len(pose.angles)])
     velocity = np.zeros((len(vertices), 3, len(unknowns)))

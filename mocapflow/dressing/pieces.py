@@ -39,7 +39,7 @@ class Piece(NamedTuple):
 def pieces_of(scene: Scene) -> Iterator[Piece]:
     """Yield each of the garments that a person wears."""
     if len(scene.pieces) == 1:
-        yield Piece(scene, slice(None), slice(None))
+        yield Piece(scene.pieces[0], slice(None), slice(None))
         return
     vertex = parameter = 0
     for piece in scene.pieces:

@@ -48,7 +48,7 @@ class Garment(Component):
 
 
 class Draper(Component):
-    """Lays a garment on posed bodies: the forward model."""
+    """Lays a garment on posed bodies: the forward model. Of several that are worn it is given one at a time."""
 
     role: ClassVar[str] = "draper"
 

@@ -68,7 +68,10 @@ class Cylinder(Garment):
             raise GarmentError(f"cylinder: there is no body around '{self.joint}'", hint="change `start`")
         outline = min(outlines, key=lambda closed: float(np.linalg.norm(closed.mean(axis=0))))
         tape = sections.perimeter(outline)
-        away = pattern.room(self.name, "upper_circumference_m", self.upper_circumference_m, tape)
+        place = "`start` (near 0 the trunk is measured with the limb)"
+        away = pattern.room(
+            f"{self.name}_{self.joint}", "upper_circumference_m", self.upper_circumference_m, tape, place
+        )
         return plane, outline, away
 
 

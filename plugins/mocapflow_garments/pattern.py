@@ -32,7 +32,7 @@ def even_links(rows: F64, link: float) -> F64:
     return even
 
 
-def room(garment: str, measure: str, around: float, tape: float) -> float:
+def room(garment: str, measure: str, around: float, tape: float, place: str = "the place") -> float:
     """Return how far a band lies outside a body that measures `tape` m there; a band inside is pushed out.
 
     Raises:
@@ -41,7 +41,7 @@ def room(garment: str, measure: str, around: float, tape: float) -> float:
     if around * MEANT < tape:
         raise GarmentError(
             f"{garment}: {measure} is {around:.2f} m, but the body measures {tape:.2f} m there",
-            hint=f"check the place and the measure; {WHOSE}",
+            hint=f"check {place} and the measure; {WHOSE}",
         )
     return max((around - tape) / (2 * math.pi), EASE)
 

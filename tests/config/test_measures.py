@@ -8,7 +8,7 @@ from mocapflow_garments.outfit import Outfit
 from mocapflow_garments.skirt import Skirt
 
 from mocapflow.config.documents import Document, Place
-from mocapflow.config.measures import garment_of, recorded_garment
+from mocapflow.config.measures import garment_of, place_of, recorded_garment
 from mocapflow.config.resolve import Resolver
 from mocapflow.errors import MocapflowError
 from mocapflow.registry import load_registry
@@ -63,6 +63,38 @@ def test_a_setting_of_the_pipeline_is_meant_for_the_garments_that_have_it(clip):
         named({"use": "from_recording", "hem_m": 1.5}, clip)
 
 
+def test_an_outfit_that_does_not_say_its_garments_is_from_the_recording(clip):
+    write(clip, [SKIRT, SLEEVE])
+    for value in ("outfit", {"use": "outfit"}):
+        assert named(value, clip) == named("from_recording", clip)
+    assert [garment.strands for garment in named({"use": "outfit", "strands": 24}, clip).garments] == [24, 24]
+
+
+def test_an_outfit_of_a_pipeline_has_its_own_measures(clip):
+    write(clip, [SKIRT, SLEEVE])
+    sleeves = [{"use": "cylinder", "joint": joint} for joint in ("shoulder_l", "shoulder_r")]
+    outfit = named({"use": "outfit", "garments": sleeves}, clip)
+    assert outfit == Outfit(garments=(Cylinder(joint="shoulder_l"), Cylinder(joint="shoulder_r")))
+    with pytest.raises(MocapflowError, match=r"garment\.garments\.0: skirt needs waist_height_m") as caught:
+        named({"use": "outfit", "garments": ["skirt"]}, clip)
+    assert "come from" not in caught.value.hint
+
+
+def test_a_recording_says_no_outfit(clip):
+    write(clip, {"type": "outfit", "garments": [SKIRT, SLEEVE]})
+    with pytest.raises(MocapflowError, match="several garments are written as a list of them") as caught:
+        recorded_garment(clip, REGISTRY)
+    assert caught.value.where == f"{clip / 'subject' / 'garment.json'}:2:11"
+
+
+def test_measures_of_a_recording_are_said_to_be_there(clip):
+    places = Resolver(Document({}, {(): Place("pipeline.yaml:2:1", clip)}), REGISTRY)
+    for value in ("from_recording", "outfit", {"use": "outfit", "strands": 24}):
+        assert place_of(value, clip, places) == str(clip / "subject" / "garment.json")
+    for value in ("skirt", {"use": "outfit", "garments": ["skirt"]}):
+        assert place_of(value, clip, places) == "pipeline.yaml:2:1"
+
+
 def test_a_pipeline_may_take_one_of_several(clip):
     write(clip, [SKIRT, SLEEVE])
     assert named("skirt", clip) == Skirt(**{f"{k}_m": v for k, v in SKIRT.items() if k != "type"})
@@ -86,6 +118,13 @@ def test_what_is_wrong_is_told_with_its_line(clip):
     with pytest.raises(MocapflowError, match="'length' and 'length_m' are one measure") as caught:
         recorded_garment(clip, REGISTRY)
     assert caught.value.where == f"{file}:{line + 1}:4"
+
+
+def test_a_garment_that_lacks_a_measure_is_told_with_its_line(clip):
+    write(clip, [SLEEVE, {"type": "skirt", "length": 0.7}])
+    with pytest.raises(MocapflowError, match="skirt needs waist_height_m") as caught:
+        recorded_garment(clip, REGISTRY)
+    assert caught.value.where == f"{clip / 'subject' / 'garment.json'}:9:12"
 
 
 @pytest.mark.parametrize("said", [[], [SKIRT, 3], [SKIRT, {"length": 0.3}], "skirt"])

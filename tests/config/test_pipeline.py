@@ -316,7 +316,7 @@ def test_measures_may_carry_their_unit_and_are_told_as_they_are_written(folder):
     with pytest.raises(MocapflowError, match=r"^clip/subject/garment.json:1:\d+  garment.colour: unknown setting"):
         load("garment=from_recording")
     file.write_text(json.dumps({key: value for key, value in MEASURES.items() if key != "length"}))
-    with pytest.raises(MocapflowError, match=r"^clip/subject/garment.json  garment: skirt needs length_m\n"):
+    with pytest.raises(MocapflowError, match=r"^clip/subject/garment.json:1:11  garment: skirt needs length_m\n"):
         load("garment=from_recording")
     file.write_text(file.read_text().replace("waist_height", "waist_hieght"))
     with pytest.raises(

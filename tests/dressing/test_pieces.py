@@ -71,6 +71,23 @@ def test_each_garment_moves_as_it_does_alone(vertices):
         assert np.abs(expected).max() > 0.01 or own < 16  # the upper edge does not lean
 
 
+def test_one_that_is_worn_as_several_is_told_by_its_own_names():
+    class Naming(Rigid):
+        name = "naming"
+
+        def drape(self, poses, parameters, past, scene):
+            assert scene.garment is WIDE
+            return super().drape(poses, parameters, past, scene)
+
+    one, parameters = replace(BOTH, garment=together("one", [WIDE])), np.array([0.0, 0.1, -0.2])
+    vertices = np.arange(COUNT, dtype=np.int32)
+    laid = drape_of(Naming(), batch(0), parameters[None], Past(), one)
+    np.testing.assert_array_equal(laid, drape_of(Rigid(), batch(0), parameters[None], Past(), ALONE[0]))
+    told = velocity_of(Naming(), tiny_pose(one), parameters, vertices, Past(), one)
+    alone = velocity_of(Rigid(), tiny_pose(one), parameters, vertices, Past(), ALONE[0])
+    np.testing.assert_array_equal(told, alone)
+
+
 def test_each_garment_knows_its_own_past():
     pose, vertices = tiny_pose(BOTH), np.arange(6.0 * COUNT).reshape(-1, 3)
     cloth = Cloth(vertices=vertices, parameters=np.arange(6.0))

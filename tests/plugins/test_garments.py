@@ -310,5 +310,21 @@ def test_an_outfit_is_what_its_garments_are():
 
 def test_a_garment_of_an_outfit_that_can_not_be_sewn_is_told():
     outfit = Outfit(garments=(Skirt(**SKIRT), Cylinder(upper_circumference_m=0.1)))
-    with pytest.raises(GarmentError, match="cylinder: upper_circumference_m is 0.10 m"):
+    with pytest.raises(GarmentError, match="cylinder_hip_l: upper_circumference_m is 0.10 m"):
         outfit.sew(BODY)
+
+
+def test_a_sleeve_that_begins_at_the_trunk_is_told_to_begin_lower():
+    body, measures = template_body(), dict(joint="shoulder_l", upper_circumference_m=0.36)
+    Cylinder(start=0.3, **measures).sew(body)
+    with pytest.raises(GarmentError, match=r"the body measures 1\.\d+ m there") as caught:
+        Cylinder(start=0.1, **measures).sew(body)
+    assert caught.value.hint.startswith("check `start` (near 0 the trunk is measured with the limb) and the measure")
+
+
+def test_a_garment_that_is_worn_twice_is_refused():
+    left, right, lower = Cylinder(), Cylinder(joint="hip_r"), Cylinder(start=0.6)
+    Outfit(garments=(left, right, lower)).sew(BODY)
+    with pytest.raises(GarmentError, match="garment 3 of the outfit is the same cylinder") as caught:
+        Outfit(garments=(left, right, Cylinder())).sew(BODY)
+    assert "such as the joint" in caught.value.hint
