@@ -54,26 +54,35 @@ def garment_of(value: Any, recording: Path, resolver: Resolver) -> Garment | Non
     """
     if value is None:
         return None
-    file = recording / FILE
-    recorded = _read_recorded(file, resolver.registry)
-    if not _is_recorded(value):
-        if _named(value) == OUTFIT:  # says all measures itself
-            return resolver.component("garment", value, ("garment",))  # type: ignore[no-any-return]
-        described = next((one for one in recorded if one.kind == _named(value)), None)
-        other = recorded[0]._replace(written={}) if recorded else RecordedGarment(file)
-        return _garment(value, described or other, resolver)
-    if not recorded:
-        find_calibration(recording)  # without one it is no recording: that comes first
-        raise _no_garment(file)
+    if _named(value) == OUTFIT and not _is_recorded(value):  # says all measures itself
+        return resolver.component("garment", value, ("garment",))  # type: ignore[no-any-return]
+    worn = _worn(value, recording, resolver.registry)
     settings = {key: given for key, given in value.items() if key != "use"} if isinstance(value, dict) else {}
-    garments = [
-        _garment({"use": one.kind, **_meant(settings, one, recorded)}, one, resolver, by_file_alone=not settings)
-        for one in recorded
-    ]
+    garments = []
+    for one in worn:
+        said = {"use": one.kind if _is_recorded(value) else _named(value), **_meant(settings, one, worn)}
+        garments.append(_garment(said, one, resolver, by_file_alone=_is_recorded(value) and not settings))
     if len(garments) == 1:
         return garments[0]
     outfit: Any = resolver.registry.get("garment", OUTFIT)
     return outfit(garments=tuple(garments))  # type: ignore[no-any-return]
+
+
+def _worn(value: Any, recording: Path, registry: Registry) -> list[RecordedGarment]:
+    """Return what the recording says of the garments that a pipeline names: of all it describes, or of those so named.
+
+    Raises:
+        RecordingError: it describes none, or not as it should be.
+    """
+    file = recording / FILE
+    recorded = _read_recorded(file, registry)
+    if not _is_recorded(value):
+        other = recorded[0]._replace(written={}) if recorded else RecordedGarment(file)
+        return [one for one in recorded if one.kind == _named(value)] or [other]
+    if not recorded:
+        find_calibration(recording)  # without one it is no recording: that comes first
+        raise _no_garment(file)
+    return recorded
 
 
 def _meant(settings: dict[str, Any], one: RecordedGarment, worn: list[RecordedGarment]) -> dict[str, Any]:

@@ -95,10 +95,14 @@ def test_measures_of_a_recording_are_said_to_be_there(clip):
         assert place_of(value, clip, places) == "pipeline.yaml:2:1"
 
 
-def test_a_pipeline_may_take_one_of_several(clip):
+def test_a_pipeline_may_take_some_of_several(clip):
     write(clip, [SKIRT, SLEEVE])
     assert named("skirt", clip) == Skirt(**{f"{k}_m": v for k, v in SKIRT.items() if k != "type"})
     assert named({"use": "cylinder", "strands": 8}, clip).joint == "shoulder_l"
+    write(clip, [SKIRT, SLEEVE, {**SLEEVE, "joint": "shoulder_r"}])
+    assert [garment.joint for garment in named({"use": "cylinder", "strands": 8}, clip).garments] == [
+        "shoulder_l", "shoulder_r"
+    ]  # fmt: skip
 
 
 def test_what_is_wrong_is_told_with_its_line(clip):
