@@ -36,7 +36,8 @@ WITHOUT_HINT = 1.1  # the same, without a hint: of a lost foot all other limbs a
 NEAR_M = 0.35  # changes farther than this from the model are somebody else
 START = np.radians(6.0)  # how far off, in each angle, a given first pose may be
 FIRST_REPEATS = 2  # times that each search is repeated in a first frame whose fit is doubted
-UNKNOWN = "too little is known of the room behind the person: limbs that are lost are not looked for"
+KNOWN = 0.4  # of the room behind the model, mean of views: less hides limbs that are lost
+UNKNOWN = "little is known of the room behind the person: limbs that are lost there are not missed"
 FEET_CAMOUFLAGED = "the feet look like the floor: outlines are not compared with them, and ankles are unsure"
 UNSEARCHED = "fit doubted as in frames before: not searched again yet"
 UNSEEN = "fit doubted: no picture tells person from room where it lies"
@@ -75,12 +76,11 @@ class LimbSearch(TriggeredSearch):
     If the first frame shows feet that look like a floor without colours, such as white socks on white, later frames do
     not match them: the outline ends above them, and would draw them up.
 
-    It needs the empty scene; where little of it is known behind the person, every fit is taken as it is.
+    It needs the empty scene. Where nobody knows what is behind the person, nothing speaks for or against a limb.
     """
 
     name: ClassVar[str] = "limb_search"
     needs_background: ClassVar[bool] = True
-    least_known: Annotated[float, Field(ge=0, le=1)] = 0.4  # of the room behind the model to be known, mean of views
     gain: Annotated[float, Field(ge=0, lt=1)] = 0.1  # share that each part mends, and a fit that cures no doubt
     samples: PositiveInt = 40  # samples of each part in a round
     poses: Poses = SHIPPED  # poses that people were seen in, made by `mocapflow prior fit`: limbs are tried as there
@@ -121,9 +121,9 @@ class LimbSearch(TriggeredSearch):
         trimaps = self.trimaps(frame, surface, past, scene)
         if not trimaps:
             return noted(result, UNSEEN, doubted=True)
-        if np.mean([trimap.known for trimap in trimaps]) < self.least_known:
-            return result if past.moments else noted(result, UNKNOWN, doubted=False)
         if not past.moments:
+            if np.mean([trimap.known for trimap in trimaps]) < KNOWN:
+                LOG.warning(UNKNOWN)
             given = scene.surface_of(state)
             warn_of_camouflage(surface, trimaps, scene.body)
             warn_of_occluders(given, self.trimaps(frame, given, past, scene), scene.body)
