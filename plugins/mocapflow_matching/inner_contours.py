@@ -52,7 +52,7 @@ class InnerContours(Matcher):
         late, early = (robust_weights(off, loss, self.scale) for loss in ("geman_mcclure", "huber"))
         doubtful = scene.covered.take(inner.vertex) & (self.covered == "near")
         loss = np.where(turn.calm(self.calm_mm) | doubtful, late, early)
-        tell = np.bincount(garment + 1)[garment + 1] >= np.where(garment < 0, 0, FEWEST)
+        tell = (garment < 0) | (np.bincount(garment + 1)[garment + 1] >= FEWEST)  # so many of one garment
         return replace(inner, pixel=inner.pixel - higher[:, None] * inner.direction, weight=inner.weight * loss * tell)
 
 
