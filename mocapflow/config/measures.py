@@ -11,7 +11,7 @@ from mocapflow.config.documents import Document, Place
 from mocapflow.config.resolve import Resolver
 from mocapflow.dressing.guards import body_of
 from mocapflow.dressing.roles import Garment
-from mocapflow.errors import MocapflowError, PluginError, RecordingError, UnknownComponent
+from mocapflow.errors import MocapflowError, PipelineError, PluginError, RecordingError, UnknownComponent
 from mocapflow.io.cameras.calibration import find_calibration
 from mocapflow.io.json_toml import place, read_json
 from mocapflow.registry import Registry
@@ -58,6 +58,7 @@ def garment_of(value: Any, recording: Path, resolver: Resolver) -> Garment | Non
         return resolver.component("garment", value, ("garment",))  # type: ignore[no-any-return]
     worn = _worn(value, recording, resolver.registry)
     settings = {key: given for key, given in value.items() if key != "use"} if isinstance(value, dict) else {}
+    _refuse_shared_measures(settings, worn, resolver)
     garments = []
     for one in worn:
         said = {"use": one.kind if _is_recorded(value) else _named(value), **_meant(settings, one, worn)}
@@ -83,6 +84,14 @@ def _worn(value: Any, recording: Path, registry: Registry) -> list[RecordedGarme
         find_calibration(recording)  # without one it is no recording: that comes first
         raise _no_garment(file)
     return recorded
+
+
+def _refuse_shared_measures(settings: dict[str, Any], worn: list[RecordedGarment], resolver: Resolver) -> None:
+    """Raise if the pipeline says a measure, in metres, that more than one of the garments worn has."""
+    for key in settings:
+        if key.endswith("_m") and sum(key in one.settings for one in worn) > 1:
+            message, hint = "more than one garment that is worn has it", f"write that of each in {worn[0].file}"
+            raise resolver.located(PipelineError(message, hint=hint), ("garment", key))
 
 
 def _meant(settings: dict[str, Any], one: RecordedGarment, worn: list[RecordedGarment]) -> dict[str, Any]:

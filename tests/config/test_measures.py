@@ -95,6 +95,15 @@ def test_measures_of_a_recording_are_said_to_be_there(clip):
         assert place_of(value, clip, places) == "pipeline.yaml:2:1"
 
 
+def test_a_measure_that_more_than_one_garment_has_is_refused(clip):
+    write(clip, [SKIRT, SLEEVE])
+    with pytest.raises(MocapflowError, match=r"garment\.length_m: more than one garment") as caught:
+        named({"use": "from_recording", "length_m": 0.4}, clip)
+    assert caught.value.where == "pipeline.yaml:2:1"
+    skirt, _ = named({"use": "from_recording", "waist_height_m": 1.0}, clip).garments
+    assert skirt.waist_height_m == 1.0
+
+
 def test_a_pipeline_may_take_some_of_several(clip):
     write(clip, [SKIRT, SLEEVE])
     assert named("skirt", clip) == Skirt(**{f"{k}_m": v for k, v in SKIRT.items() if k != "type"})
