@@ -50,6 +50,8 @@ def pieces_of(scene: Scene) -> Iterator[Piece]:
 
 
 def touchable(draper: Draper, scene: Scene) -> Bool:
-    """Return which joints (J,) move what the garments hang from or can touch."""
+    """Return which joints (J,) move what the garments hang from or can touch, from the root on."""
+    from mocapflow.geometry import kinematics  # compiled code, loaded where it is used
+
     each = np.stack([draper.touchable(piece.scene) for piece in pieces_of(scene)])
-    return np.asarray(each.any(axis=0))
+    return np.asarray(kinematics.descendants(scene.body.parents) @ each.any(axis=0))

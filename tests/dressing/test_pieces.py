@@ -36,9 +36,8 @@ class Seeing(Rigid):
         return super().drape(poses, parameters, past, scene)
 
     def touchable(self, scene):
-        touched = np.zeros(len(scene.body.parents), bool)
-        touched[1 if scene.garment is WIDE else 2] = True
-        return touched
+        touched = "knee_l" if scene.garment is WIDE else "hip_r"
+        return np.array([name == touched for name in scene.body.joint_names])
 
 
 def batch(*seeds):
@@ -101,8 +100,14 @@ def test_each_garment_knows_its_own_past():
 
 
 def test_what_moves_one_of_them_moves_the_cloth():
-    assert np.flatnonzero(touchable(Seeing(), BOTH)).tolist() == [1, 2]
-    assert np.flatnonzero(touchable(Seeing(), ALONE[1])).tolist() == [2]
+    """A knee is moved by its hip and the pelvis, too."""
+
+    def names(scene):
+        return [name for name, moves in zip(BODY.joint_names, touchable(Seeing(), scene), strict=True) if moves]
+
+    assert names(ALONE[0]) == ["pelvis", "hip_l", "knee_l"]
+    assert names(ALONE[1]) == ["pelvis", "hip_r"]
+    assert names(BOTH) == ["pelvis", "hip_l", "knee_l", "hip_r"]
 
 
 def test_what_a_draper_returns_is_checked_garment_by_garment():
