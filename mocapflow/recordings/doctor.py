@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from mocapflow.config import measures
+from mocapflow.config import measures, recorded_garments
 from mocapflow.dressing.guards import mesh_of
 from mocapflow.dressing.roles import Garment
 from mocapflow.errors import MocapflowError, RecordingError, UnknownComponent, raised
@@ -102,7 +102,7 @@ def _garment(folder: Path, registry: Registry) -> list[Finding]:
     except UnknownComponent as problem:  # its plugin may be on another machine
         return [warning(problem.message, problem.hint, problem.where)]
     except MocapflowError as problem:
-        return [error(problem.message, problem.hint, problem.where or folder / measures.FILE)]
+        return [error(problem.message, problem.hint, problem.where or folder / recorded_garments.FILE)]
 
 
 def _compared(folder: Path, registry: Registry) -> list[Finding]:
@@ -132,11 +132,11 @@ def _sewn(garment: Garment, folder: Path, registry: Registry) -> list[Finding]:
     except MocapflowError as problem:
         if scanned:
             raise
-        return [warning(f"on the template: {problem.message}", problem.hint, folder / measures.FILE)]
+        return [warning(f"on the template: {problem.message}", problem.hint, folder / recorded_garments.FILE)]
     except (Exception, SystemExit) as problem:  # a garment of somebody else's may raise anything
-        return [error(f"{garment.name} can't be sewn: {raised(problem)}", where=folder / measures.FILE)]
+        return [error(f"{garment.name} can't be sewn: {raised(problem)}", where=folder / recorded_garments.FILE)]
     mended = mesh.repairs if scanned else ()  # a template is not as wide as the person
-    return [warning(f"{mesh.name}: {said}", where=folder / measures.FILE) for said in mended]
+    return [warning(f"{mesh.name}: {said}", where=folder / recorded_garments.FILE) for said in mended]
 
 
 def _start(folder: Path, calibration: Path) -> list[Finding]:
