@@ -54,10 +54,10 @@ class Scene:
         return tuple(replace(self, garment=piece) for piece in worn) or (self,)
 
     @cached_property
-    def piece(self) -> I32:
-        """To which of the garments (W,) that are worn a vertex of all of them belongs."""
+    def garment_index(self) -> I32:
+        """To which of the garments that are worn each surface vertex (N,) belongs; -1: it is the body's."""
         counts = [0 if one.garment is None else len(one.garment.vertices) for one in self.pieces]
-        return np.repeat(np.arange(len(counts), dtype=np.int32), counts)
+        return np.repeat(np.arange(-1, len(counts), dtype=np.int32), [len(self.body.vertices), *counts])
 
     @cached_property
     def faces(self) -> I32:

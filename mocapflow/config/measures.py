@@ -133,7 +133,8 @@ def _named(value: Any) -> Any:
 
 def _is_recorded(value: Any) -> bool:
     """Return whether the recording says what is worn."""
-    return _named(value) == FROM_RECORDING or (_named(value) == OUTFIT and "garments" not in value)
+    says_garments = isinstance(value, dict) and "garments" in value
+    return _named(value) == FROM_RECORDING or (_named(value) == OUTFIT and not says_garments)
 
 
 def _no_garment(file: Path) -> RecordingError:

@@ -102,7 +102,7 @@ def velocity_of(draper: Draper, pose: Pose, parameters: F64, vertices: I32, past
     Raises:
         InvalidOutput: they are of another shape, or not finite.
     """
-    if len(scene.pieces) == 1:
+    if len(scene.pieces) == 1:  # as mostly, and without a copy
         return _told(draper, pose, parameters, vertices, past, scene.pieces[0])
     unknowns = np.arange(6 + len(pose.angles) + len(parameters))
     pose_columns, cloth_columns = np.split(unknowns, [6 + len(pose.angles)])

@@ -43,14 +43,14 @@ class TakeUp(ClothFitter):
             return cloth
         lived = len(past.moments)
         due = lived == 1 or falls_due(past.moments[-1].time, frame.time, EVERY)
-        lengths = garment.columns(TAKE_UP) if due else []
-        depths = garment.columns(THICKNESS) if lived < REMEMBERED else []
-        if not (lengths or depths):
+        take_ups = garment.columns(TAKE_UP) if due else []
+        thicknesses = garment.columns(THICKNESS) if lived < REMEMBERED else []
+        if not (take_ups or thicknesses):
             return cloth
         trials = Trials(estimate.pose, model, past, outline_error(estimate.pose, cloth, segmentation, model))
-        for column in lengths:
+        for column in take_ups:
             cloth = taken_up(cloth, column, trials, frame.time)
-        for column in depths:
+        for column in thicknesses:
             cloth = thickened(cloth, column, trials)
         return cloth
 

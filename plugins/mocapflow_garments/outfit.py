@@ -14,7 +14,7 @@ from mocapflow.geometry.outfits import together
 
 
 class Outfit(Garment):
-    """Garments that are sewn, draped and fitted each by itself, and seen together; they do not touch each other."""
+    """Garments that are sewn and draped each by itself, with forces of its own; they do not touch each other."""
 
     name: ClassVar[str] = "outfit"
     garments: Annotated[tuple[Garment, ...], Field(min_length=1)]  # what is worn, each with its settings

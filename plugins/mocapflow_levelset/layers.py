@@ -43,7 +43,7 @@ def layer_of(scene: Scene) -> I32:
     body, garments = scene.body, [piece.garment for piece in scene.pieces if piece.garment is not None]
     _, of_joint = np.unique([unsided(name) for name in body.joint_names], return_inverse=True)
     _, of_garment = np.unique([unsided(garment.name) for garment in garments], return_inverse=True)
-    layers = [of_joint[body.main_joint], of_joint.max() + 1 + of_garment[scene.piece]]
+    layers = [of_joint[body.main_joint], of_joint.max() + 1 + of_garment[scene.garment_index[len(body.vertices) :]]]
     return np.concatenate(layers, dtype=np.int32)
 
 

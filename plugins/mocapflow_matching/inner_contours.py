@@ -46,7 +46,7 @@ class InnerContours(Matcher):
         inner = without_camouflaged(segmentation.inner, past)
         image = project_each(surface.vertices[inner.vertex], inner.camera, scene.cameras)
         away = np.einsum("ma,ma->m", inner.pixel - image, inner.direction)
-        garment = worn_at(inner.vertex, scene)
+        garment = scene.garment_index[inner.vertex]
         higher = slipped(away, garment, inner, surface, scene)
         off = np.abs(away - higher) * np.sqrt(inner.weight)
         late, early = (robust_weights(off, loss, self.scale) for loss in ("geman_mcclure", "huber"))
@@ -56,17 +56,12 @@ class InnerContours(Matcher):
         return replace(inner, pixel=inner.pixel - higher[:, None] * inner.direction, weight=inner.weight * loss * tell)
 
 
-def worn_at(vertices: I32, scene: Scene) -> I32:
-    """Return to which garment (M,) that is worn a vertex of the surface belongs; -1: it is the body's."""
-    return np.concatenate([np.full(len(scene.body.vertices), -1, np.int32), scene.piece])[vertices]
-
-
 def slipped(away: F64, garment: I32, inner: Matches, surface: Surface, scene: Scene) -> F64:
     """Return by how many px (M,) a waistband is away all around: the median length; pairs of the body are by none.
 
     Args:
         away: (M,) px of each pair, along its direction.
-        garment: (M,) of each pair, see `worn_at`.
+        garment: (M,) of each pair, see `Scene.garment_index`.
         inner: the pairs.
         surface: where they are estimated to be.
         scene: the cameras.

@@ -14,7 +14,7 @@ from mocapflow_levelset.inner import SIGMA_PX, findable_edges, inner_contours
 from mocapflow_levelset.inner_edges import inner_edges
 from mocapflow_levelset.layers import COLOURS, colour_model, layer_of
 from mocapflow_matching.contour_icp import ContourIcp
-from mocapflow_matching.inner_contours import InnerContours, slipped, worn_at
+from mocapflow_matching.inner_contours import InnerContours, slipped
 from mocapflow_matching.layered_icp import LayeredIcp, of_another_layer
 from test_layers import CLOTHS, SCENE, SKIN, dressed, learned, painted
 
@@ -177,7 +177,7 @@ def test_garments_slip_each_by_itself():
     twice = replace(SCENE, garment=together("both", [SCENE.garment, SCENE.garment]))
     band, other = SCENE.garment.pinned[:9], len(SCENE.garment.vertices) + SCENE.garment.pinned[:3]
     vertex = np.concatenate([[0, 1], len(SCENE.body.vertices) + np.concatenate([band, other])]).astype(np.int32)
-    garment = worn_at(vertex, twice)
+    garment = twice.garment_index[vertex]
     assert garment.tolist() == [-1] * 2 + [0] * 9 + [1] * 3
     pose, away = leaning(0.0), np.repeat([7.0, 3.0, -2.0], [2, 9, 3])
     pairs = replace(
