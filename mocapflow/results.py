@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mocapflow.data import UNKNOWN, Flow, Frame, FrameResult, Pose, blind
+from mocapflow.data import UNKNOWN, Cloth, Flow, Frame, FrameResult, Pose, blind
 from mocapflow.knocks import Knocks
 from mocapflow.records import F32, F64, I16, I32, Bool, Watch, array, record, silent
 from mocapflow.series import Numbers, Wide, changed
@@ -116,6 +116,10 @@ class Track:
     def pose(self, row: int) -> Pose:
         """Return the pose of one row."""
         return Pose(root=self.root[row].copy(), angles=self.angles[row].copy())
+
+    def cloth_at(self, row: int) -> Cloth:
+        """Return the cloth of one row."""
+        return Cloth(vertices=np.array(self.cloth[row]), parameters=self.cloth_parameters[row].copy())
 
 
 def _unknown(lost: Bool, covariance: F64, rows: Numbers) -> F64:

@@ -42,10 +42,9 @@ class RevisedTrack:
 
     def cloth(self, row: int) -> Cloth:
         """Return the cloth of a row as it stands."""
-        track, other = self.before, self._found.get(row)
-        if other:
+        if other := self._found.get(row):
             return Cloth(vertices=other["cloth"], parameters=other["cloth_parameters"])
-        return Cloth(vertices=np.array(track.cloth[row]), parameters=track.cloth_parameters[row].copy())
+        return self.before.cloth_at(row)
 
     def replaced(self, row: int) -> bool:
         """Return whether a row has another fit than the track had."""

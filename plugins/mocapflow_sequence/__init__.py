@@ -13,6 +13,7 @@ def mocapflow_stages() -> list[type[Stage]]:
     from mocapflow_sequence.background import EmptyScene
     from mocapflow_sequence.flow import FollowPoints
     from mocapflow_sequence.join import Join
+    from mocapflow_sequence.revise_background import ReviseBackground
     from mocapflow_sequence.smooth import Smooth
 
-    return [EmptyScene, CoupledLoop, FollowPoints, Join, Smooth]
+    return [EmptyScene, CoupledLoop, FollowPoints, Join, ReviseBackground, Smooth]

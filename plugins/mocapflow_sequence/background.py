@@ -20,7 +20,8 @@ from mocapflow.recordings.recording import Recording
 from mocapflow.records import U8
 from mocapflow.scene import Scene
 from mocapflow_sequence.dominant_colours import dominant_colours
-from mocapflow_sequence.first_frame import LEAST_SHARE, Learnt, empty_scene
+from mocapflow_sequence.first_frame import empty_scene
+from mocapflow_sequence.learnt import LEAST_SHARE, Learnt, spread_out
 
 LOG = logging.getLogger("mocapflow")
 TURNED = (
@@ -46,6 +47,10 @@ class EmptyScene(Stage):
     extent: ClassVar[Literal["first"]] = "first"  # that of the `Start`; pictures come from all over the recording
     source: Literal["auto", "plates", "recording"] = "auto"  # auto: the plates where there are any
     samples: Annotated[int, Field(ge=3)] = 50  # pictures of each camera that are looked at
+
+    def has_plates(self, recording: Recording) -> bool:
+        """Return whether clean plates show the empty scene, so that it need not be learnt."""
+        return self.source != "recording" and bool(plate_files(recording.folder, recording.views))
 
     def need(self, recording: Recording) -> None:
         """Raise if plates are wanted and missing, or if a camera lacks one though others have theirs."""
@@ -113,11 +118,8 @@ class EmptyScene(Stage):
 
     def _pictures(self, recording: Recording, camera: int) -> U8:
         """Return pictures (N, H, W, 3) of one camera, spread over the recording."""
-        step = max(recording.length // self.samples, 1)
-        read = range(step // 2, recording.length, step)  # evenly, but up to twice as many as are kept
-        kept = {read[round(row)] for row in np.linspace(0, len(read) - 1, self.samples)}
-        sampled = replace(recording.seen_by(camera), indices=read)
-        pictures = [frame.images[0] for frame in sampled.frames() if frame.usable[0] and frame.index in kept]
+        frames = spread_out(recording, camera, range(recording.length), self.samples)
+        pictures = [frame.images[0] for frame in frames]
         if len(pictures) < 3:
             raise RecordingError(
                 f"{recording.views[camera].lens.name} has {len(pictures)} readable frames: too few to tell the room",

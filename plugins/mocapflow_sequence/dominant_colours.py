@@ -6,25 +6,27 @@ import numba
 import numpy as np
 
 from mocapflow.io.recording.plates import LEAST_SPREAD, NORMAL
-from mocapflow.records import F32, U8
+from mocapflow.records import F32, U8, Bool
 from mocapflow_sequence.colours import Colours
 
 SAME = 4.0  # standard deviations of the noise within which a pixel has the same colour in two pictures
 LEAST_SAME = 6.0  # grey levels: compressed pictures differ by so much where nothing moves
 
 
-def dominant_colours(pictures: U8, count: int) -> list[Colours]:
+def dominant_colours(pictures: U8, count: int, counted: Bool | None = None) -> list[Colours]:
     """Return the dominant colours of each pixel, the most common first.
 
     Args:
         pictures: (N, H, W, 3), of one camera; what moves covers each pixel in some of them only.
         count: how many.
+        counted: (N, H, W) which pixels of which pictures tell; None: all do.
     """
     within = np.maximum(SAME * np.sqrt(2) * noise(pictures), LEAST_SAME).astype(np.int32)
     shape = (count, *pictures.shape[1:])
     mean, spread = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
     share = np.zeros(shape[:3], np.float32)
-    _dominant_colours(pictures, within, mean, spread, share)
+    counted = np.ones(pictures.shape[:3], bool) if counted is None else counted
+    _dominant_colours(pictures, counted, within, mean, spread, share)
     spread = np.maximum(spread, np.maximum(np.median(spread[0], axis=(0, 1)), LEAST_SPREAD), dtype=np.float32)
     return [Colours(*view) for view in zip(mean, spread, share, strict=True)]
 
@@ -36,14 +38,15 @@ def noise(pictures: U8) -> F32:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _dominant_colours(pictures, within, mean, spread, share):  # type: ignore[no-untyped-def]
+def _dominant_colours(pictures, counted, within, mean, spread, share):  # type: ignore[no-untyped-def]
     number, height, width, _ = pictures.shape
     row, left = np.empty((width, number, 3), np.int32), np.empty(number, np.bool_)
     for y in range(height):
         for j in range(number):  # a pixel's values side by side
             row[:, j] = pictures[j, y]
         for x in range(width):
-            left[:] = True
+            for j in range(number):
+                left[j] = counted[j, y, x]
             for k in range(len(mean)):
                 best, count = _seed(row[x], within, left)
                 if not count:

@@ -13,26 +13,14 @@ from mocapflow.data import Surface
 from mocapflow.geometry.cameras import magnification
 from mocapflow.geometry.silhouettes import covered, distance_to
 from mocapflow.records import F32, F64, U8, Bool
-from mocapflow_sequence.colours import DEEP, Colours, alike, every, lab_bins, more_common, shaded
+from mocapflow_sequence.colours import DEEP, Colours, alike, lab_bins, more_common, shaded
 from mocapflow_sequence.dominant_colours import dominant_colours
+from mocapflow_sequence.learnt import LEAST_SHARE, Learnt, brightest, shown
 
-LEAST_SHARE = 0.06  # of the pictures that has to show a colour
 COLOURS = 4  # of each pixel that are looked at: the room's, of who stands there, of shadows
 REACH_M = 0.15  # from the body at the start pose: limbs may be off by so much, and clothes stand off
 AROUND_M = 0.5  # up to where the room beside the person is looked at
 ROUNDS = 2  # first the body in its start pose is the person, then what differs there from the room that was found
-
-
-class Learnt(NamedTuple):
-    """The empty scene in one view, in grey levels."""
-
-    mean: F32  # (H, W, 3)
-    spread: F32  # (H, W, 3) standard deviation, inf where nobody knows
-
-    @property
-    def known(self) -> Bool:
-        """Where (H, W) somebody knows."""
-        return np.asarray(np.isfinite(self.spread[..., 0]))
 
 
 class Evidence(NamedTuple):
@@ -64,17 +52,17 @@ def empty_scene(pictures: U8, first: U8, body: Surface, camera: Camera) -> Learn
     """
     colours, now = dominant_colours(pictures, COLOURS), lab_bins(first)
     usual = np.median(colours[0].spread, axis=(0, 1))
-    shown = _shown(first, usual)
+    beginning = shown(first, usual)
     person, away_m = _about(body, camera)
     far = away_m > REACH_M
     beside = far & (away_m < AROUND_M)
     for _ in range(ROUNDS):
         rooms, persons = more_common(now[beside], now[person]), more_common(now[person], now[beside])
-        far = far & ~_left_behind(colours[0], shown, rooms)
+        far = far & ~_left_behind(colours[0], beginning, rooms)
         beside = beside & far
-        evidence = Evidence(shown.mean, far, rooms, persons)
-        learnt = chosen((*colours, shown), evidence)
-        person = ~far & learnt.known & ~alike(shown, learnt.mean) & ~shaded(shown.mean, learnt.mean)
+        evidence = Evidence(beginning.mean, far, rooms, persons)
+        learnt = chosen((*colours, beginning), evidence)
+        person = ~far & learnt.known & ~alike(beginning, learnt.mean) & ~shaded(beginning.mean, learnt.mean)
     return lit(learnt, pictures, evidence, usual, floor_around(body, camera) & learnt.known)
 
 
@@ -82,21 +70,18 @@ def chosen(colours: Iterable[Colours], evidence: Evidence) -> Learnt:
     """Return the first colour of each pixel that is the room's."""
     learnt = Learnt(evidence.first.copy(), np.full(evidence.first.shape, np.inf, np.float32))
     for colour in colours:
-        _take(learnt, colour, (colour.share >= LEAST_SHARE) & ~learnt.known & evidence.of_room(colour))
+        learnt.take(colour, (colour.share >= LEAST_SHARE) & ~learnt.known & evidence.of_room(colour))
     return learnt
 
 
 def lit(learnt: Learnt, pictures: U8, evidence: Evidence, usual: F32, floor: Bool) -> Learnt:
-    """Return an empty scene whose floor is as bright as any picture shows it, for the person may always shade it."""
+    """Return an empty scene whose floor is as bright as any picture shows it."""
     if not floor.any():  # a view that shows none, or none that is known
         return learnt
     dim = Learnt(*(part[floor][:, None] for part in learnt))
     there = evidence._replace(first=evidence.first[floor][:, None], far=evidence.far[floor][:, None])
-    found = Learnt(dim.mean.copy(), dim.spread)
-    for picture in pictures:
-        colour = _shown(picture[floor][:, None], usual)
-        brighter = every(colour.mean > found.mean) & ~alike(colour, found.mean)
-        _take(found, colour, brighter & shaded(colour.mean, dim.mean, DEEP) & there.of_room(colour))
+    colours = (shown(picture[floor][:, None], usual) for picture in pictures)
+    found = brightest(dim, ((colour, there.of_room(colour)) for colour in colours))
     learnt.mean[floor], learnt.spread[floor] = found.mean[:, 0], found.spread[:, 0]
     return learnt
 
@@ -106,12 +91,6 @@ def _left_behind(dominant: Colours, first: Colours, rooms: Bool) -> Bool:
     return rooms[lab_bins(dominant.mean)] & ~rooms[lab_bins(first.mean)] & ~alike(dominant, first.mean)
 
 
-def _shown(picture: U8, usual: F32) -> Colours:
-    """Return the colours of one picture, as noisy (3,) as is usual."""
-    spread = np.broadcast_to(usual, picture.shape)
-    return Colours(picture.astype(np.float32), spread, np.ones(picture.shape[:2], np.float32))
-
-
 def _about(body: Surface, camera: Camera) -> tuple[Bool, F64]:
     """Return where (H, W) a body is seen, and how far (H, W) m from it every pixel is, at its distance."""
     person = covered(body, camera)
@@ -119,8 +98,3 @@ def _about(body: Surface, camera: Camera) -> tuple[Bool, F64]:
         return person, np.full(person.shape, np.inf)
     away_px = distance_to(person).astype(np.float64)
     return person, away_px / magnification(camera, body.vertices.mean(axis=0))
-
-
-def _take(learnt: Learnt, colour: Colours, where: Bool) -> None:
-    """Put a colour into what is learnt, in place."""
-    learnt.mean[where], learnt.spread[where] = colour.mean[where], colour.spread[where]

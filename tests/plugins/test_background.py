@@ -25,6 +25,7 @@ from mocapflow.recordings.recording import open_recording
 from mocapflow.running.recipes import steps_of
 from mocapflow.scene import Scene
 from mocapflow.testing import pictures, scenes
+from tests.fixtures.patterned_room import STRIPES, taken
 from tests.fixtures.recordings import number_of, ring, write_recording
 from tests.fixtures.stores import PLUGIN, write_pipeline
 
@@ -162,36 +163,6 @@ def test_colours_are_those_that_most_pictures_agree_about():
         rest = values[~alike[best]]
         most = max(((np.abs(rest - value) <= LEAST_SAME).sum() for value in rest), default=0)
         assert second.share[y, x] == pytest.approx(most / 12)
-
-
-def taken(places, shade=1.0, seed=0):
-    """Return pictures (N, 240, 320, 3) of a striped person at places (px from the first), and the truth.
-
-    A tile of the floor has a colour that nothing else has; the shadow of the person in the first place falls on it.
-    """
-    rng = np.random.default_rng(seed)
-    scene = scenes.tiny_scene()
-    pose = scenes.tiny_pose(scene, 3)
-    body = scene.undressed.surface(pose, scenes.tiny_cloth(scene, pose))
-    mask = pictures.tiny_masks(scene, pose)[0]
-    empty = np.array([120, 150, 175]) * boards()
-    empty[TILE] *= [0.8, 1.2, 1.2]
-    shown = []
-    for place in places:
-        there = np.roll(mask, place, axis=1)
-        shadow = np.where(np.roll(mask, place, axis=1) | ~np.roll(mask, place + 30, axis=1), 1.0, shade)[..., None]
-        clean = np.where(there[..., None], np.roll(STRIPES, place, axis=1), empty * shadow)
-        shown.append(np.clip(clean + rng.normal(0, 2, clean.shape), 0, 255).astype(np.uint8))
-    return np.stack(shown), empty, mask, body, scene.cameras[0]
-
-
-def boards():
-    rows, columns = np.mgrid[:240, :320]
-    return (1 + 0.06 * np.sin(columns / 9) + 0.04 * np.cos(rows / 17))[..., None]
-
-
-TILE = np.s_[172:196, 202:212]
-STRIPES = np.array([60, 40, 150]) * (1 + 0.3 * np.sin(np.arange(320) / 3))[None, :, None] * np.ones((240, 1, 1))
 
 
 def learnt(places, shade=1.0, move=None):

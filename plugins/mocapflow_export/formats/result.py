@@ -8,7 +8,7 @@ from types import ModuleType
 
 import numpy as np
 
-from mocapflow.data import NO_CLOTH, Cloth, PoseBatch, Surface
+from mocapflow.data import NO_CLOTH, PoseBatch, Surface
 from mocapflow.errors import PipelineError
 from mocapflow.geometry import kinematics
 from mocapflow.recordings.recording import Recording
@@ -46,8 +46,7 @@ class Result:
 
     def surface(self, row: int) -> Surface:
         """Return body and garment in one frame."""
-        parameters = self.track.cloth_parameters[row]
-        return self.scene.surface(self.track.pose(row), Cloth(vertices=self.track.cloth[row], parameters=parameters))
+        return self.scene.surface(self.track.pose(row), self.track.cloth_at(row))
 
     def bare(self, row: int) -> Surface:
         """Return the body alone in one frame."""
