@@ -160,6 +160,11 @@ def notes_of(frames: I32, notes: Iterable[str]) -> tuple[str, ...]:
     return tuple(note for note in notes if note.partition(":")[0] in heads)
 
 
+def in_order(notes: Iterable[str]) -> tuple[str, ...]:
+    """Return the notes of a track in the order of the frames they are about."""
+    return tuple(sorted(notes, key=lambda note: int(note.removeprefix("frame ").partition(":")[0])))
+
+
 @record
 class RunFolder:
     """Where a run writes its results, and how it was made."""

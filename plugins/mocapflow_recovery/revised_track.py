@@ -13,7 +13,7 @@ from mocapflow.data import REMEMBERED, Cloth, Frame, FrameResult, Moment, Past, 
 from mocapflow.geometry import kinematics
 from mocapflow.model import increment_between, moved
 from mocapflow.records import F64, array_fields
-from mocapflow.results import Track, values_of
+from mocapflow.results import Track, in_order, values_of
 from mocapflow.series import overwritten
 
 REFITTED = "fitted again from between its neighbours"
@@ -111,8 +111,8 @@ class RevisedTrack:
             if name not in KEPT
         }
         again = {row: REFITTED if len(self.beside(row)) == 2 else END_REFITTED for row in found}
-        notes = sorted([*track.notes, *(f"frame {track.frame[row]}: {again[row]}" for row in found)], key=_frame_of)
-        return replace(track, notes=tuple(notes), **changes)
+        notes = in_order([*track.notes, *(f"frame {track.frame[row]}: {again[row]}" for row in found)])
+        return replace(track, notes=notes, **changes)
 
     def _later(self) -> F64:
         """Return how far (T - 2,) on the way from the frame before to the one after each inner frame lies, 0 to 1."""
@@ -132,7 +132,3 @@ class RevisedTrack:
 def _off(before: F64, here: F64, after: F64, later: F64) -> F64:
     """Return how far (…, J, 3) m joints are from between two frames, `later` (0 to 1) on the way to the second."""
     return np.asarray(here - ((1 - later) * before + later * after))
-
-
-def _frame_of(note: str) -> int:
-    return int(note.removeprefix("frame ").partition(":")[0])

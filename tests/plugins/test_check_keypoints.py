@@ -1,0 +1,135 @@
+"""Hands and feet beside 2D keypoints: which frames are doubted, and what is not compared."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from keypoint_recording import copy_demo, template, write
+from mocapflow_recovery.check_keypoints import CheckKeypoints
+from results_scene import demo_scene, stepping, tube
+
+from mocapflow.geometry.kinematics import joint_centres
+from mocapflow.recordings.recording import open_recording
+from mocapflow.results import ViewChecks
+from mocapflow.scene import Scene
+
+BODY = template()
+TRUE = replace(stepping(BODY, 6), notes=("frame 1: cam01 black", "frame 5: fitted again"))
+SCENE = Scene(cameras=demo_scene().cameras, body=BODY)
+KNEE, ANKLE = BODY.screw_names.index("knee_l.flexion"), BODY.joint("ankle_l")
+
+
+def astray(*rows, by=0.8):
+    """The track with a knee bent by so much (rad) more in some rows."""
+    angles = TRUE.angles.copy()
+    angles[list(rows), KNEE] += by
+    return replace(TRUE, angles=angles)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A recording whose keypoints are right, beside a bystander."""
+    place = copy_demo(tmp_path_factory.mktemp("marked") / "recording")
+    write(place, BODY, [TRUE.pose(row) for row in range(6)], SCENE.cameras)
+    return place
+
+
+@pytest.fixture
+def recording(folder):
+    return open_recording(folder, stop=6)
+
+
+def off_cm(track):
+    """How far the left ankle of each row is from its true place."""
+    ankles = [joint_centres(BODY, each.root, each.angles)[:, ANKLE] for each in (track, TRUE)]
+    return 100 * np.linalg.norm(ankles[0] - ankles[1], axis=1)
+
+
+def test_a_track_that_is_right_is_left_alone(recording, caplog):
+    checked = CheckKeypoints().run(TRUE, recording, SCENE)
+    assert not checked.doubted.any() and checked.notes == TRUE.notes and not caplog.messages
+
+
+def test_a_leg_elsewhere_is_doubted_and_told(recording, caplog):
+    track = replace(astray(2, 4), doubted=TRUE.frame == 0)
+    checked = CheckKeypoints().run(track, recording, SCENE)
+    assert np.flatnonzero(checked.doubted).tolist() == [0, 2, 4]
+    first, second, third, last = checked.notes
+    assert (first, last) == TRUE.notes
+    for row, note in ((2, second), (4, third)):
+        head, _, said = note.partition(": keypoints have ankle_l ")
+        assert head == f"frame {row}"
+        assert float(said.removesuffix(" cm away")) == pytest.approx(off_cm(track)[row], abs=1.5)
+    (message,) = caplog.messages
+    assert message.startswith("keypoints have ankle_l elsewhere in 2 of 6 frames, up to ")
+    np.testing.assert_array_equal(checked.angles, track.angles)
+
+
+def test_what_counts_as_elsewhere_is_a_setting(recording):
+    track = astray(3)
+    near, far = (
+        CheckKeypoints(apart_m=off_cm(track)[3] / 100 + by).run(track, recording, SCENE) for by in (-0.02, 0.02)
+    )
+    assert near.doubted.any() and not far.doubted.any()
+
+
+def test_a_recording_without_keypoints_is_left_alone(recording):
+    track = astray(2)
+    none = replace(recording, keypoint_folders=(None,) * 4)
+    assert CheckKeypoints().run(track, none, SCENE) is track
+
+
+def test_joints_near_a_garment_are_not_compared(recording):
+    low = tube(BODY)
+    low = replace(low, vertices=low.vertices - [0.0, 0.0, 0.4])
+    checked = CheckKeypoints().run(astray(2), recording, replace(SCENE, garment=low))
+    assert not checked.doubted.any()
+    high = CheckKeypoints().run(astray(2), recording, replace(SCENE, garment=tube(BODY)))
+    assert high.doubted.any()
+
+
+def spoilt(folder, place, change):
+    """Copy a recording's keypoints with `change` made to those of the person, (25, 3), by the number of the camera."""
+    copied = copy_demo(place / "spoilt")
+    for number, view in enumerate(sorted((folder / "keypoints").iterdir())):
+        (copied / "keypoints" / view.name).mkdir(parents=True)
+        for file in view.iterdir():
+            people = json.loads(file.read_text())["people"]
+            points = np.reshape(people[-1]["pose_keypoints_2d"], (-1, 3))
+            change(number, points)
+            people[-1]["pose_keypoints_2d"] = points.ravel().tolist()
+            (copied / "keypoints" / view.name / file.name).write_text(json.dumps({"people": people}))
+    return open_recording(copied, stop=6)
+
+
+def test_three_cameras_have_to_agree(folder, tmp_path):
+    """Two of four cameras mark the ankle right; the two others each somewhere else."""
+
+    def change(number, points):
+        points[15, :2] += {1: (90.0, -70.0), 3: (-40.0, 110.0)}.get(number, (0.0, 0.0))
+
+    checked = CheckKeypoints().run(astray(2), spoilt(folder, tmp_path, change), SCENE)
+    assert not checked.doubted.any()
+
+
+def test_where_two_cameras_have_keypoints_both_are_enough(folder, recording):
+    folders = tuple(place if number < 2 else None for number, place in enumerate(recording.keypoint_folders))
+    checked = CheckKeypoints().run(astray(2), replace(recording, keypoint_folders=folders), SCENE)
+    assert np.flatnonzero(checked.doubted).tolist() == [2]
+
+
+def test_wrong_views_are_left_out(recording):
+    """With three of four pictures of the frame known to be wrong, nothing places its keypoints."""
+    checks = ViewChecks(frame=np.full(3, 2, np.int32), camera=np.arange(3, dtype=np.int16), reasons=("torn",) * 3)
+    checked = CheckKeypoints().run(astray(2, 3), recording, SCENE, checks)
+    assert np.flatnonzero(checked.doubted).tolist() == [3]
+
+
+def test_keypoints_of_nobody_are_told_and_do_no_harm(folder, tmp_path, caplog):
+    nobody = spoilt(folder, tmp_path, lambda number, points: None)
+    for file in (nobody.folder / "keypoints").rglob("*.json"):
+        file.write_text('{"people": []}')
+    track = astray(2)
+    assert CheckKeypoints().run(track, nobody, SCENE) is track
+    assert caplog.messages[0].startswith("the track is not compared with the keypoints: ")
