@@ -17,11 +17,12 @@ from mocapflow.data import NO_CLOTH, Start
 from mocapflow.errors import RecordingError
 from mocapflow.io.recording.plates import plate_files
 from mocapflow.recordings.recording import Recording
-from mocapflow.records import U8
+from mocapflow.records import U8, Bool
 from mocapflow.scene import Scene
 from mocapflow_sequence.dominant_colours import dominant_colours
 from mocapflow_sequence.first_frame import empty_scene
 from mocapflow_sequence.learnt import LEAST_SHARE, Learnt, spread_out
+from mocapflow_sequence.people import people_seen
 
 LOG = logging.getLogger("mocapflow")
 TURNED = (
@@ -36,8 +37,9 @@ class EmptyScene(Stage):
 
     Without clean plates it takes one of the dominant colours of each pixel over the whole recording. If a stage before
     makes a `Start`, the pose of the first frame and the colours beside the person in it tell which is the room's; else
-    it is the most common one. Nobody knows what is behind a person who stays in place throughout. Memory is bounded by
-    `samples` pictures of one camera.
+    it is the most common one. Nobody knows what is behind a person who stays in place throughout. Where the recording
+    has 2D keypoints, what is near those of a picture is not the room in it, whatever its colour: so white socks are not
+    taken for a pale floor. Memory is bounded by `samples` pictures of one camera.
 
     Of a floor without colours it learns the height, too, if the person's shadow tells it: then views can tell grey
     clothes from shadows together (`mocapflow_levelset.shadow_consistency`).
@@ -100,30 +102,32 @@ class EmptyScene(Stage):
 
     def _learnt(self, recording: Recording, scene: Scene, start: Start | None) -> Iterator[Learnt]:
         """Yield the empty scene of each view; without a start pose the dominant colours, whoever's they are."""
-        views = range(len(recording.views))
+        pictures = (self._pictures(recording, c) for c in range(len(recording.views)))
         if start is None:
-            yield from (self._dominant_colours(self._pictures(recording, c)) for c in views)
+            yield from (self._dominant_colours(*seen) for seen in pictures)
             return
         first, body = recording.frame(recording.indices[0]), scene.undressed.surface(start.pose, NO_CLOTH)
-        for c in views:
-            pictures = self._pictures(recording, c)
+        for c, seen in enumerate(pictures):
             if first.usable[c]:
-                yield empty_scene(pictures, first.images[c], body, scene.cameras[c])
+                alone = people_seen(recording, c, [first.index]).beside(first.index, first.images[c].shape)
+                images, nobody = seen
+                yield empty_scene(images, first.images[c], body, scene.cameras[c], nobody, alone)
             else:
-                yield self._dominant_colours(pictures)
+                yield self._dominant_colours(*seen)
 
-    def _dominant_colours(self, pictures: U8) -> Learnt:
-        mean, spread, share = dominant_colours(pictures, 1)[0]
+    def _dominant_colours(self, pictures: U8, nobody: Bool) -> Learnt:
+        mean, spread, share = dominant_colours(pictures, 1, nobody)[0]
         return Learnt(mean, np.where(share[..., None] >= LEAST_SHARE, spread, np.float32(np.inf)))
 
-    def _pictures(self, recording: Recording, camera: int) -> U8:
-        """Return pictures (N, H, W, 3) of one camera, spread over the recording."""
-        frames = spread_out(recording, camera, range(recording.length), self.samples)
-        pictures = [frame.images[0] for frame in frames]
-        if len(pictures) < 3:
+    def _pictures(self, recording: Recording, camera: int) -> tuple[U8, Bool]:
+        """Return pictures (N, H, W, 3) of one camera, spread over the recording, and where (N, H, W) nobody is seen."""
+        frames = list(spread_out(recording, camera, range(recording.length), self.samples))
+        if len(frames) < 3:
             raise RecordingError(
-                f"{recording.views[camera].lens.name} has {len(pictures)} readable frames: too few to tell the room",
+                f"{recording.views[camera].lens.name} has {len(frames)} readable frames: too few to tell the room",
                 where=str(recording.folder),
                 hint="give a clean plate in background/, or a longer recording",
             )
-        return np.stack(pictures)
+        people = people_seen(recording, camera, [frame.index for frame in frames])
+        nobody = [people.beside(frame.index, frame.images[0].shape) for frame in frames]
+        return np.stack([frame.images[0] for frame in frames]), np.stack(nobody)

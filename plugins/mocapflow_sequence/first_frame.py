@@ -38,7 +38,9 @@ class Evidence(NamedTuple):
         return np.where(self.far, alike(colour, self.first) | lit, self.rooms[bins])
 
 
-def empty_scene(pictures: U8, first: U8, body: Surface, camera: Camera) -> Learnt:
+def empty_scene(
+    pictures: U8, first: U8, body: Surface, camera: Camera, nobody: Bool | None = None, nobody_first: Bool | None = None
+) -> Learnt:
     """Return one view of the empty scene: of the dominant colours of each pixel the first that is the room's.
 
     Away from the body in its start pose, the first frame shows the room, but where a limb was that the pose has
@@ -49,12 +51,15 @@ def empty_scene(pictures: U8, first: U8, body: Surface, camera: Camera) -> Learn
         first: (H, W, 3) the first frame.
         body: the person in it, in the start pose.
         camera: the view.
+        nobody: (N, H, W) False where somebody is known to be seen; None: nothing is known.
+        nobody_first: (H, W) the same of the first frame.
     """
-    colours, now = dominant_colours(pictures, COLOURS), lab_bins(first)
+    nobody_first = np.ones(first.shape[:2], bool) if nobody_first is None else nobody_first
+    colours, now = dominant_colours(pictures, COLOURS, nobody), lab_bins(first)
     usual = np.median(colours[0].spread, axis=(0, 1))
-    beginning = shown(first, usual)
+    beginning = shown(first, usual, nobody_first)
     person, away_m = _about(body, camera)
-    far = away_m > REACH_M
+    far = (away_m > REACH_M) & nobody_first
     beside = far & (away_m < AROUND_M)
     for _ in range(ROUNDS):
         rooms, persons = more_common(now[beside], now[person]), more_common(now[person], now[beside])
@@ -88,7 +93,8 @@ def lit(learnt: Learnt, pictures: U8, evidence: Evidence, usual: F32, floor: Boo
 
 def _left_behind(dominant: Colours, first: Colours, rooms: Bool) -> Bool:
     """Return where (H, W) most pictures show a colour of the room, and the first frame another one that is not."""
-    return rooms[lab_bins(dominant.mean)] & ~rooms[lab_bins(first.mean)] & ~alike(dominant, first.mean)
+    other = rooms[lab_bins(dominant.mean)] & ~rooms[lab_bins(first.mean)] & ~alike(dominant, first.mean)
+    return other & (dominant.share > 0)
 
 
 def _about(body: Surface, camera: Camera) -> tuple[Bool, F64]:

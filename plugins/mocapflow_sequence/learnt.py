@@ -32,10 +32,10 @@ class Learnt(NamedTuple):
         self.mean[where], self.spread[where] = colour.mean[where], colour.spread[where]
 
 
-def shown(picture: U8, usual: F32) -> Colours:
-    """Return the colours of one picture, as noisy (3,) as is usual."""
-    spread = np.broadcast_to(usual, picture.shape)
-    return Colours(picture.astype(np.float32), spread, np.ones(picture.shape[:2], np.float32))
+def shown(picture: U8, usual: F32, nobody: Bool | None = None) -> Colours:
+    """Return the colours of one picture, as noisy (3,) as is usual; none where (H, W) somebody is."""
+    share = np.ones(picture.shape[:2], np.float32) if nobody is None else nobody.astype(np.float32)
+    return Colours(picture.astype(np.float32), np.broadcast_to(usual, picture.shape), share)
 
 
 def brightest(dim: Learnt, pictures: Iterable[tuple[Colours, Bool]]) -> Learnt:

@@ -281,7 +281,7 @@ def test_as_many_pictures_as_stated_from_all_over_the_recording(tmp_path, monkey
     seen = []
     monkeypatch.setattr(
         "mocapflow_sequence.background.dominant_colours",
-        lambda pictures, count: seen.extend(pictures) or dominant_colours(pictures, count),
+        lambda pictures, *given: seen.extend(pictures) or dominant_colours(pictures, *given),
     )
     EmptyScene(samples=25).run(open_recording(tmp_path, stop=3), scenes.tiny_scene(cameras=1))
     numbers = [number_of(picture) for picture in seen]
