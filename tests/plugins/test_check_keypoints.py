@@ -104,7 +104,7 @@ def spoilt(folder, place, change):
 
 
 def seen_larger(folder, place, offs, by):
-    """Return the doubts of a leg astray, if cameras mark its ankle so far off, (x, y) px, in images `by` times as large."""
+    """Return the doubts of a leg astray whose ankle cameras mark so far off, (x, y) px, in images so much larger."""
 
     def change(number, points):
         points[15, :2] += offs[number]
