@@ -81,7 +81,7 @@ class Track:
     iterations: I16 = array("T", unit="turns of the loop")
     steady: Bool = array("T", unit="True where the loop came to rest")
     oscillating: Bool = array("T", unit="True where it swung between two states")
-    doubted: Bool = array("T", unit="True where the images contradict the fit, and nothing better was found")
+    doubted: Bool = array("T", unit="True where images or keypoints contradict the fit, and nothing better was found")
     usable: Bool = array("T", "C", unit="False: lost or corrupted view")
     overlap: F64 = array("T", "C", unit="1, intersection over union of model and image silhouette")
     seconds: F64 = array("T", "K", unit="s of CPU per step of the loop")

@@ -21,7 +21,7 @@ def quality_warnings(track: Track, cameras: Sequence[str]) -> list[str]:
     count, lost = len(track.frame), int(track.lost.sum())
     said = [f"{lost} of {count} frames are lost: their pose is a guess"] if lost else []
     if track.doubted.any():
-        said.append(f"{track.doubted.sum()} of {count} frames are doubted: the images contradict them")
+        said.append(f"{track.doubted.sum()} of {count} frames are doubted: images or keypoints contradict them")
     median = overlap_medians(track)
     for index, (camera, own) in enumerate(zip(cameras, median, strict=True)):
         others = middle(np.delete(median, index))

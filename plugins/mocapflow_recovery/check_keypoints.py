@@ -10,7 +10,6 @@ import numpy as np
 from mocapflow_fitting.detections import has_keypoints, names_of, persons
 from mocapflow_fitting.keypoint_layouts import rows_of
 from mocapflow_fitting.person import Person
-from mocapflow_fitting.triangulate import USUAL_PX
 from pydantic import PositiveFloat
 
 from mocapflow.components import Stage
@@ -24,7 +23,7 @@ from mocapflow.scene import Scene
 
 LOG = logging.getLogger("mocapflow")
 ENDS = ("wrist", "ankle")  # of limbs, on either side: pose estimators mark them within a few centimetres
-AGREE_PX = 3 * USUAL_PX  # within which a camera supports a triangulated keypoint
+AGREES = 0.1  # a view supports a keypoint if more of its confidence counts: within three times `halving_px`
 VIEWS = 3  # that have to support it, where so many have keypoints
 APART = (
     "keypoints have %s elsewhere in %d of %d frames, up to %.0f cm away: these frames are doubted. Either the limb is"
@@ -39,7 +38,8 @@ class CheckKeypoints(Stage):
     is learnt from the recording. A pose estimator knows what hands and feet look like. Its keypoints, triangulated, are
     too coarse to improve a fit, but not to tell that a limb is lost.
 
-    Wrists and ankles are compared, where no garment ends near them. A recording without keypoints is left as it is.
+    Wrists and ankles are compared, where no garment ends near them. Lost frames are left as they are, for their pose is
+    a guess anyway; so is a recording without keypoints.
     """
 
     name: ClassVar[str] = "check_keypoints"
@@ -58,8 +58,8 @@ class CheckKeypoints(Stage):
             return track
         joints = [scene.body.joint_names[joint] for joint in ends]
         marked, places = np.full((len(track.frame), len(ends), 3), np.nan), rows_of(names, joints)
-        for row, index in enumerate(track.frame.tolist()):
-            if index in people:
+        for row in np.flatnonzero(~track.lost).tolist():
+            if (index := int(track.frame[row])) in people:
                 marked[row] = np.where(places[:, None] >= 0, _supported(people[index])[places], np.nan)
         off = np.linalg.norm(joint_centres(scene.body, track.root, track.angles)[:, ends] - marked, axis=2)
         return self._doubted(track, joints, off)
@@ -86,6 +86,6 @@ def _ends(scene: Scene) -> I32:
 
 def _supported(person: Person) -> F64:
     """Return a person's keypoints (K, 3) m, NaN where too few cameras support one."""
-    views = (person.points.error < AGREE_PX).sum(axis=0)
+    views = (person.points.weight > AGREES * person.confidence).sum(axis=0)
     enough = views >= min(VIEWS, (person.confidence > 0).any(axis=1).sum())
     return np.where(enough[:, None], person.points.position, np.nan)

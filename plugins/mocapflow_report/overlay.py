@@ -107,5 +107,5 @@ def _remarks(frame: Frame, track: Track, row: int, view: int) -> list[str]:
     if track.lost[row]:
         said.append("frame lost, bridged")
     if track.doubted[row]:
-        said.append("doubted: the images contradict this pose")
+        said.append("doubted: images or keypoints contradict this pose")
     return said

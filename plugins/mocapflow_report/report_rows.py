@@ -77,7 +77,7 @@ def mishaps(track: Track, held: Mapping[str, int]) -> list[str]:
     lost, restless = track.lost, ~track.steady
     said = [f"frames lost and bridged: {_spans(track, lost)}"] if lost.any() else []
     if track.doubted.any():
-        said.append(f"frames that the images contradict: {_spans(track, track.doubted)}")
+        said.append(f"frames that images or keypoints contradict: {_spans(track, track.doubted)}")
     if restless.any():
         said.append(f"{restless.sum()} of {len(restless)} frames did not come to rest: {_spans(track, restless)}")
     if track.oscillating.any():

@@ -103,14 +103,36 @@ def spoilt(folder, place, change):
     return open_recording(copied, stop=6)
 
 
-def test_three_cameras_have_to_agree(folder, tmp_path):
-    """Two of four cameras mark the ankle right; the two others each somewhere else."""
+def seen_larger(folder, place, offs, by):
+    """Return the doubts of a leg astray whose ankle cameras mark so far off, (x, y) px, in images so much larger."""
 
     def change(number, points):
-        points[15, :2] += {1: (90.0, -70.0), 3: (-40.0, 110.0)}.get(number, (0.0, 0.0))
+        points[15, :2] += offs[number]
+        points[:, :2] *= by
 
-    checked = CheckKeypoints().run(astray(2), spoilt(folder, tmp_path, change), SCENE)
-    assert not checked.doubted.any()
+    size = np.diag([by, by, 1.0])
+    cameras = tuple(replace(camera, intrinsics=size @ camera.intrinsics) for camera in SCENE.cameras)
+    return CheckKeypoints().run(astray(2), spoilt(folder, place, change), replace(SCENE, cameras=cameras)).doubted
+
+
+@pytest.mark.parametrize("by", [0.1, 1.0, 10.0])
+def test_three_cameras_have_to_agree(folder, tmp_path, by):
+    """Two of four cameras mark the ankle right; the two others each somewhere else."""
+    offs = [(0.0, 0.0), (90.0, -70.0), (0.0, 0.0), (-40.0, 110.0)]
+    assert not seen_larger(folder, tmp_path, offs, by).any()
+
+
+@pytest.mark.parametrize("by", [0.1, 1.0, 10.0])
+def test_cameras_agree_but_for_usual_errors(folder, tmp_path, by):
+    offs = [(-4.0, 0.0), (4.0, 0.0), (-4.0, 0.0), (4.0, 0.0)]
+    assert np.flatnonzero(seen_larger(folder, tmp_path, offs, by)).tolist() == [2]
+
+
+def test_lost_frames_are_guesses_anyway(recording, caplog):
+    track = astray(2, 4)
+    checked = CheckKeypoints().run(replace(track, iterations=track.iterations * (track.frame != 2)), recording, SCENE)
+    assert np.flatnonzero(checked.doubted).tolist() == [4]
+    assert " in 1 of 6 frames" in caplog.text
 
 
 def test_where_two_cameras_have_keypoints_both_are_enough(folder, recording):

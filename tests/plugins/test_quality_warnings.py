@@ -50,5 +50,5 @@ def test_lost_and_doubted_frames_are_counted():
     said = quality_warnings(seen(0.9, 0.9, 0.9, 0.9, iterations=known, doubted=doubted), NAMES)
     assert said == [
         "1 of 8 frames are lost: their pose is a guess",
-        "3 of 8 frames are doubted: the images contradict them",
+        "3 of 8 frames are doubted: images or keypoints contradict them",
     ]

@@ -84,10 +84,10 @@ def test_overlay_of_a_lost_view_says_so(scene: Scene, track: Track, recording: R
 
 def test_the_report_says_at_once_which_frames_the_images_contradict(track: Track) -> None:
     doubted = replace(track, doubted=np.arange(len(track.frame)) == 1)
-    said, names = "1 of 4 frames are doubted: the images contradict them", ["cam01", "cam02", "cam03", "cam04"]
+    said, names = "1 of 4 frames are doubted: images or keypoints contradict them", ["cam01", "cam02", "cam03", "cam04"]
     assert said not in report_rows.glance(track, names, None) and said in report_rows.glance(doubted, names, None)
     assert report_rows.mishaps(track, {}) == []
-    assert report_rows.mishaps(doubted, {}) == ["frames that the images contradict: 1"]
+    assert report_rows.mishaps(doubted, {}) == ["frames that images or keypoints contradict: 1"]
     (swings,) = report_rows.mishaps(replace(track, oscillating=np.arange(len(track.frame)) >= 2), {})
     assert swings == "frames that swing between two states: 2–3"
 
