@@ -34,7 +34,8 @@ class ReviseBackground(Stage):
     for the room, unless that is the same colour, or the same in more light. A part of the person that was taken for the
     room because the start pose had it elsewhere is gone then, and much of what was unknown is known.
 
-    What no tracked picture shows beside the person stays as it was; so does a view whose camera was knocked.
+    What no tracked picture shows beside the person stays as it was, and frames that are lost or doubted tell nothing; a
+    view whose camera was knocked stays as it was, too.
     """
 
     name: ClassVar[str] = "revise_background"
@@ -66,7 +67,8 @@ class ReviseBackground(Stage):
 
     def _seen(self, recording: Recording, scene: Scene, track: Track, camera: int) -> Iterator[tuple[U8, Bool]]:
         """Yield pictures (H, W, 3) of a view that were tracked, each with where (H, W) it shows the room."""
-        rows = {int(track.frame[row]): row for row in np.flatnonzero(~track.lost & track.usable[:, camera]).tolist()}
+        telling = ~track.lost & ~track.doubted & track.usable[:, camera]
+        rows = {int(track.frame[row]): row for row in np.flatnonzero(telling).tolist()}
         for frame in spread_out(recording, camera, recording.indices, self.samples):
             if frame.index in rows:
                 row, hidden = rows[frame.index], frame.hidden_in(0)

@@ -141,8 +141,9 @@ def test_a_view_that_tells_nothing_stays_as_it_is():
         np.testing.assert_array_equal(found.mean[camera], given.mean[camera])
 
 
-def test_lost_frames_tell_nothing():
+@pytest.mark.parametrize("changes", [{"observed": np.zeros_like(TRACK.observed)}, {"doubted": TRACK.frame >= 0}])
+def test_lost_and_doubted_frames_tell_nothing(changes):
     given = before()
-    found = run(given, replace(TRACK, observed=np.zeros_like(TRACK.observed)))
+    found = run(given, replace(TRACK, **changes))
     for old, new in zip(given.mean, found.mean, strict=True):
         np.testing.assert_array_equal(old, new)
