@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from mocapflow_fitting.detections import has_keypoints
 from mocapflow_levelset.floor_height import floor_height, grey_floor
 from pydantic import Field
 
@@ -29,6 +30,10 @@ TURNED = (
     "%s has moved by %.1f px since its clean plate was taken, which is laid over its first picture;"
     " if its calibration is older than that, too, calibrate again, or see the stage align_cameras"
 )
+NO_PLATES = (
+    "no clean plates in %s: the recording itself tells what is behind the person, but not where they always stand%s"
+)
+MORE = "; 2D keypoints in keypoints/ would tell more (examples/mediapipe_keypoints.py)"
 FLOOR_FRAMES = 4  # in which the person's shadow may tell the height of the floor
 
 
@@ -83,11 +88,7 @@ class EmptyScene(Stage):
                     LOG.warning(TURNED, view.lens.name, shift)
             return plates
         if self.source == "auto":
-            LOG.warning(
-                "no clean plates in %s: the recording itself tells what is behind the person, but not where they always"
-                " stand",
-                recording.folder / "background",
-            )
+            LOG.warning(NO_PLATES, recording.folder / "background", "" if has_keypoints(recording) else MORE)
         learnt = list(self._learnt(recording, scene, start))
         return Background(mean=tuple(view.mean for view in learnt), spread=tuple(view.spread for view in learnt))
 
