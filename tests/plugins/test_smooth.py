@@ -51,7 +51,7 @@ def test_reduces_noise_at_high_frame_rates() -> None:
 
 
 def test_a_root_keeps_the_motion_of_people_and_loses_noise() -> None:
-    """It turns to and fro once a second by 17 degrees, and moves by 6 cm."""
+    """It turns this way and that once a second, by 17 degrees, and moves by 6 cm."""
     rng, time = np.random.default_rng(6), np.arange(0, 3, 1 / 120)
     sway = np.sin(2 * np.pi * time)[:, None]
     still, turned = np.zeros((len(time), 3)), 0.3 * sway * np.array([0.0, 0.0, 1.0])
