@@ -109,8 +109,10 @@ def thickened(cloth: Cloth, column: int, trials: Trials) -> Cloth:
 def lowest(places: F64, values: F64) -> float:
     """Return where the parabola through the least of values (N,) at evenly spaced places and its neighbours is lowest.
 
-    At an end the parabola goes on, though not far.
+    At an end the parabola goes on, though not far. Fewer than three values, as of narrow bounds, have none.
     """
+    if len(values) < 3:
+        return float(places[values.argmin()])
     middle = int(np.clip(values.argmin(), 1, len(values) - 2))
     before, here, after = values[middle - 1 : middle + 2]
     slope, bend = 0.5 * (after - before), before - 2 * here + after

@@ -139,7 +139,7 @@ def parts(body: Body) -> list[I32 | None]:
         joint for joint, parent in enumerate(body.parents) if simple[joint] and (parent < 0 or not simple[parent])
     ]
     limbs = [np.flatnonzero(below[joint][body.screw_joint]).astype(np.int32) for joint in starts]
-    trunk = np.setdiff1d(np.arange(len(body.twists), dtype=np.int32), np.concatenate([[], *limbs]).astype(np.int32))
+    trunk = np.setdiff1d(np.arange(len(body.twists), dtype=np.int32), np.concatenate(limbs))
     return [None, *(part for part in (trunk, *limbs) if len(part))]
 
 

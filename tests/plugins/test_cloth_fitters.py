@@ -47,11 +47,11 @@ def seen(model, truth):
     return Segmentation(silhouettes=tuple(found))
 
 
-def fitted(fitter, model, truth, start, past=None, time=0.0):
+def fitted(fitter, model, truth, start, past=None, time=0.0, turn=TURN):
     blank = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
     frame = Frame(index=0, time=time, images=(blank,) * 4, usable=np.ones(4, bool))
     estimate = Estimate(pose=STANDING, parameters=start, covariance=np.eye(10 + len(start)), observed=np.ones(4))
-    return fitter.fit(frame, seen(model, truth), estimate, model, past or Past(), TURN)
+    return fitter.fit(frame, seen(model, truth), estimate, model, past or Past(), turn)
 
 
 def later(model):
@@ -101,6 +101,30 @@ def test_thickness_is_measured_in_the_first_frame_and_kept(model):
     thickness = model.scene.garment.parameter_names.index("thickness_m")
     assert abs(fitted(SampledForces(), model, truth, nothing).parameters[thickness] - 0.006) <= 0.002
     assert fitted(SampledForces(), model, truth, nothing, later(model)).parameters[thickness] == 0
+    calm = model.drape(STANDING, nothing, Past())
+    second, third = (
+        fitted(SampledForces(), model, truth, nothing, lived(model, calm, *times)) for times in ([0.0], [0.0, 0.1])
+    )
+    assert second.parameters[thickness] > 0.004 and third.parameters[thickness] == 0
+
+
+def test_no_other_forces_are_tried_than_asked_for(model):
+    fitter = SampledForces(directions=2, amounts_deg=(12.0,), rounds=0, force_sd_deg=90.0)
+    truth = parameters(model, wind_cos_rad=0.2, wind_sin_rad=0.2)
+    found = np.degrees(fitted(fitter, model, truth, parameters(model)).parameters[1:6])
+    assert found[model.scene.garment.parameter_names.index("wind_cos_rad") - 1] == pytest.approx(12)
+    assert all(np.isclose(found, 0) | np.isclose(np.abs(found), 12))
+
+
+def test_a_search_that_was_led_astray_comes_back_to_calm_cloth(model):
+    start = parameters(model, flare_rad=0.4, wind_cos_rad=0.5)
+    assert not fitted(SampledForces(), model, parameters(model), start, later(model)).parameters.any()
+
+
+def test_forces_that_were_estimated_are_held_about_none_too(model):
+    start = parameters(model, wind_cos_rad=0.3)
+    column = model.scene.garment.parameter_names.index("wind_cos_rad")
+    assert fitted(SampledForces(force_sd_deg=2.0), model, start, start, later(model)).parameters[column] < 0.25
 
 
 def test_the_take_up_fitter_measures_the_thickness_in_the_first_frames_but_the_very_first(model):
@@ -168,6 +192,25 @@ def test_a_hem_that_hardly_shows_moves_little_in_one_step(model):
     past = lived(model, model.drape(STANDING, start, Past()), -0.1, 0.0)
     found = fitted(TakeUp(), model, parameters(model, take_up=0.06), start, past, 0.1)
     assert 0 < found.parameters[column] < 0.01
+    longer = fitted(TakeUp(), model, parameters(model, take_up=0.06), start, past, 1.0)
+    assert longer.parameters[column] > 5 * found.parameters[column]  # in ten times the time it may change more
+
+
+def test_a_hem_that_hardly_shows_stays_near_the_frame_before_whatever_is_estimated(model):
+    column, truth = model.scene.garment.parameter_names.index("take_up"), parameters(model, take_up=0.06)
+    past = lived(model, model.drape(STANDING, truth, Past()), -0.1, 0.0)
+    assert fitted(TakeUp(), model, truth, parameters(model), past, 0.1).parameters[column] > 0.02
+
+
+@pytest.mark.parametrize("highest", [0.0, 0.012])
+def test_a_take_up_of_narrow_bounds_is_found_within_them(model, highest):
+    garment = model.scene.garment
+    column, bounds = garment.parameter_names.index("take_up"), garment.parameter_bounds.copy()
+    bounds[column, 1] = highest
+    tied = replace(model, scene=replace(model.scene, garment=replace(garment, parameter_bounds=bounds)))
+    start, truth = parameters(tied, flare_rad=0.3), parameters(model, take_up=0.06, flare_rad=0.3)
+    found = fitted(TakeUp(), tied, truth, start, lived(tied, tied.drape(STANDING, start, Past()), 0.0), 1 / 30)
+    assert found.parameters[column] == pytest.approx(highest, abs=0.002)
 
 
 def test_a_step_is_as_long_whenever_the_frame_before_it_was(model):
@@ -189,13 +232,21 @@ def test_the_take_up_steps_every_tenth_of_a_second(model):
     assert stepped == list(range(3, 31, 3))
 
 
-def test_nothing_is_taken_up_while_the_person_is_being_found_or_is_not_seen(model):
+@pytest.mark.parametrize("fitter", [SampledForces(), GaussNewton(), TakeUp()], ids=lambda fitter: fitter.name)
+def test_a_garment_that_no_view_shows_hangs_as_it_is_estimated(fitter, model):
+    start = parameters(model, take_up=0.06, flare_rad=0.3)
+    unseen = Estimate(pose=STANDING, parameters=start, covariance=np.eye(10 + len(start)), observed=np.ones(4))
+    frame = Frame(index=3, time=0.1, images=(), usable=np.zeros(4, bool))
+    kept = fitter.fit(frame, Segmentation(silhouettes=()), unseen, model, later(model), TURN)
+    np.testing.assert_array_equal(kept.parameters, start)
+
+
+def test_nothing_is_taken_up_while_the_person_is_being_found_nor_twice_in_a_frame(model):
     truth, start = parameters(model, take_up=0.06, flare_rad=0.3), parameters(model, flare_rad=0.3)
     np.testing.assert_array_equal(fitted(TakeUp(), model, truth, start).parameters, start)
-    unseen = Estimate(pose=STANDING, parameters=start, covariance=np.eye(10 + len(start)), observed=np.ones(4))
-    frame = Frame(index=2, time=2 / 30, images=(), usable=np.zeros(4, bool))
-    kept = TakeUp().fit(frame, Segmentation(silhouettes=()), unseen, model, later(model), TURN)
-    np.testing.assert_array_equal(kept.parameters, start)
+    past = lived(model, model.drape(STANDING, start, Past()), 0.0)
+    again = fitted(TakeUp(), model, truth, start, past, 1 / 30, turn=Turn(index=1))
+    np.testing.assert_array_equal(again.parameters, start)
 
 
 @pytest.fixture(scope="module")
@@ -242,6 +293,9 @@ def test_values_of_a_parabola_tell_where_it_is_lowest():
 def test_forces_that_gain_nothing_are_left_alone(model):
     truth = parameters(model, flare_rad=0.1)
     np.testing.assert_array_equal(fitted(SampledForces(), model, truth, truth, later(model)).parameters, truth)
+    calm = parameters(model)
+    most = fitted(SampledForces(least_gain=0.99), model, truth, calm, later(model)).parameters
+    assert np.any(fitted(SampledForces(), model, truth, calm, later(model)).parameters) and not np.any(most)
 
 
 def test_a_garment_without_forces_hangs_as_it_does(fitter, model):

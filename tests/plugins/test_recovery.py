@@ -25,6 +25,7 @@ from mocapflow_recovery.trimaps import SmallRoom, _distance, small_rooms, trimap
 from mocapflow.data import NO_CLOTH, Frame, Past, Pose
 from mocapflow.geometry.cameras import project, shrunk
 from mocapflow.geometry.silhouettes import covered
+from mocapflow.model import increment_between
 from mocapflow.testing import pictures, recovery, scenes, template_body
 
 SCENE = scenes.tiny_scene()
@@ -236,6 +237,25 @@ def test_samples_differ_in_their_part_and_keep_the_limits() -> None:
     np.testing.assert_allclose(np.std(centre, axis=0), SPREAD.shift, rtol=0.15)  # the root turns about its joint
 
 
+@pytest.mark.parametrize("part", [None, parts(SCENE.body)[1]], ids=["root", "leg"])
+def test_samples_lie_as_far_off_as_their_spread_and_their_share_of_it(part) -> None:
+    """A joint that rest holds hardly bends."""
+    held, free = np.tile([-9.0, 9.0], (len(POSE.angles), 1)), SCENE.body.rest_spread.copy()
+    free[1] = 0.02
+    body = replace(SCENE.body, limits=held, rest_spread=free)
+    far, near = (
+        np.stack([increment_between(POSE, pose) for pose in samples(POSE, part, body, SPREAD, share, 400, rng)])
+        for share, rng in ((1.0, np.random.default_rng(0)), (0.25, np.random.default_rng(0)))
+    )
+    np.testing.assert_allclose(near, 0.25 * far, atol=1e-9)
+    if part is None:
+        np.testing.assert_allclose(np.std(far[:, :3], axis=0), SPREAD.turn, rtol=0.15)
+    else:
+        first = far[:: len(set(body.screw_joint[part])), 6 + part]  # in which all of the leg moves
+        expected = np.minimum(free[part], SPREAD.angle)
+        np.testing.assert_allclose(np.std(first, axis=0), expected, rtol=0.2)
+
+
 def test_search_finds_a_leg() -> None:
     def cost(poses):
         return np.array([apart(pose, seen_now) for pose in poses])
@@ -246,6 +266,14 @@ def test_search_finds_a_leg() -> None:
     assert abs(found.angles[hip] - POSE.angles[hip]) < 0.1
 
 
+def test_search_finds_nothing_worse_than_where_it_began() -> None:
+    def cost(poses):
+        return np.array([np.abs(pose.angles - POSE.angles).sum() for pose in poses])
+
+    plan = PLAN._replace(seen=np.full((1, len(POSE.angles)), 0.5), seen_samples=1)
+    assert search(cost, POSE, SCENE.body, plan, np.random.default_rng(0)) is POSE
+
+
 def test_the_leg_that_fits_better_moves_first() -> None:
     """There is room for one of two; the one that is tried first fits less well."""
     body = template_body()
@@ -253,7 +281,7 @@ def test_the_leg_that_fits_better_moves_first() -> None:
 
     def cost(poses):
         moved = np.array([[pose.angles[leg].any() for leg in (first, second)] for pose in poses])
-        return 10 * moved.all(axis=1) - 2 * moved[:, 0] - 3 * moved[:, 1]
+        return 4 * moved.all(axis=1) - 2 * moved[:, 0] - 3 * moved[:, 1]
 
     still = Pose(root=POSE.root, angles=np.zeros(len(body.twists)))
     plan = Plan(Spread(0.0, 0.0, 0.0), (1.0,), 1, np.full((1, len(body.twists)), 0.1), 1)
@@ -263,14 +291,18 @@ def test_the_leg_that_fits_better_moves_first() -> None:
 
 def test_what_fits_about_as_well_stays_as_it_was() -> None:
     body = template_body()
-    first, second = parts(body)[2:4]
+    first, second, third = parts(body)[2:5]
 
     def cost(poses):
-        return np.array([1.0 + 0.01 * pose.angles[first].any() + (not pose.angles[second].all()) for pose in poses])
+        """Return what poses cost; half of the third limb where it was, half elsewhere, can't be."""
+        angles = [pose.angles for pose in poses]
+        return np.array([1.0 + 0.01 * a[first].any() + (not a[second].all()) + (0 < a[third].mean() < 0.099)
+                         for a in angles])  # fmt: skip
 
     still = Pose(root=POSE.root, angles=np.zeros(len(body.twists)))
-    found = put_back(cost, Pose(root=POSE.root, angles=still.angles + 0.1), [still], body, 0.03)
+    found = put_back(cost, Pose(root=np.eye(4), angles=still.angles + 0.1), [still], body, 0.03)
     assert found.angles[second].all() and not np.delete(found.angles, second).any()
+    assert found.root is POSE.root
 
 
 def test_a_limb_is_also_sampled_from_each_further_joint_on() -> None:
@@ -286,13 +318,16 @@ def test_a_leg_stays_where_an_arm_was_lost() -> None:
     leg, arm = (np.flatnonzero(body.screw_joint == body.joint(name)) for name in ("hip_l", "shoulder_r"))
 
     def mismatch(poses):
-        return np.array([100.0 * (not p.angles[arm].any()) + 5.0 * (not p.angles[leg].any()) for p in poses])
+        return np.array([100.0 * (not p.angles[arm].any()) + 5.0 * (not p.angles[leg].any())
+                         + 50.0 * (p.root is fitted.root) for p in poses])  # fmt: skip
 
     fitted = Pose(root=POSE.root, angles=np.zeros(len(body.twists)))
-    found = Pose(root=POSE.root, angles=fitted.angles + 0.1)
+    found = Pose(root=np.eye(4), angles=fitted.angles + 0.1)
     kept = without_idle_parts(mismatch, found, fitted, body, 0.1)
-    assert kept.angles[arm].all() and not kept.angles[leg].any()
+    assert kept.angles[arm].all() and not kept.angles[leg].any() and kept.root is found.root
     assert without_idle_parts(mismatch, found, fitted, body, 0.01).angles[leg].all()
+    nothing_off = without_idle_parts(lambda poses: np.zeros(len(poses)), found, fitted, body, 0.1)
+    assert not nothing_off.angles.any()  # all parts are idle
 
 
 def test_a_foot_does_not_turn_because_its_leg_was_found() -> None:
@@ -583,6 +618,9 @@ def test_seen_samples_bend_what_was_seen_and_nothing_else() -> None:
     assert all(pose.angles[leg[0]] in seen_poses[:, leg[0]] for pose in tried)
     assert all((np.delete(pose.angles, leg[0]) == np.delete(POSE.angles, leg[0])).all() for pose in tried)
     assert not seen_samples(POSE, parts(SCENE.body)[1], SCENE.body, plan, np.random.default_rng(0))
+    stiff = replace(SCENE.body, limits=np.tile([-0.2, 0.2], (len(POSE.angles), 1)))
+    tried = seen_samples(POSE, leg, stiff, plan._replace(seen_samples=9), np.random.default_rng(0))
+    assert sorted(pose.angles[leg[0]] for pose in tried) == pytest.approx([0.1, 0.2, 0.2, 0.2, 0.2])  # each once
 
 
 @pytest.mark.parametrize("left", [0, 8])

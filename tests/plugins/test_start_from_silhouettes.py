@@ -43,6 +43,7 @@ def test_a_body_is_put_where_it_is_wanted_and_turned(bare):
         vertices = bare.surface(pose, NO_CLOTH).vertices
         np.testing.assert_allclose((vertices.max(axis=0) + vertices.min(axis=0)) / 2, middle, atol=1e-9)
         assert heading_between(placed(bare, 0.0, angles, middle), pose) == pytest.approx(turn)
+        np.testing.assert_allclose(pose.root[:2, 1], [-np.sin(turn), np.cos(turn)])  # counter-clockwise from above
 
 
 def test_rays_through_the_middles_of_silhouettes_meet_in_the_middle_of_a_person(bare):
