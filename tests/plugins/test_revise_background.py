@@ -55,6 +55,7 @@ def test_what_nobody_knew_is_known_where_it_is_seen():
     _, found, empty, mask = again([0] * 8 + [60] * 5, unknown=np.s_[100:200])
     seen = ~(mask & np.roll(mask, 60, axis=1))
     assert found.known[seen].all() and off(found, empty)[seen].max() < 12
+    assert abs((found.mean - empty)[100:200][seen[100:200]].mean()) < 0.5  # noise is no light
     hidden = ~seen
     hidden[:100] = hidden[200:] = False
     assert hidden.sum() > 20 and not found.known[hidden].any()
@@ -99,10 +100,13 @@ def test_shadows_and_lighter_colours_of_another_tint_give_way(toned):
     assert off(found, empty)[SOCK].max() < 12
 
 
-def test_a_person_lighter_than_the_room_is_no_light_in_it():
+@pytest.mark.parametrize("tint, lost", [(1.3, False), ((1.0, 1.2, 1.4), True)])
+def test_a_person_lighter_than_the_room_is_no_light_in_it(tint, lost):
+    """Nor where the track has lost them in a picture, if their colour is another one."""
     shown, empty, mask, *_ = taken([0] * 8 + [60] * 5)
     there = np.stack([np.roll(mask, place, axis=1) for place in [0] * 8 + [60] * 5])
-    shown = np.where(there[..., None], np.clip(1.3 * empty, 0, 255), shown).astype(np.uint8)
+    shown = np.where(there[..., None], np.clip(empty * tint, 0, 255), shown).astype(np.uint8)
+    there[-1] &= not lost
     room = Learnt(empty.astype(np.float32), np.full(empty.shape, 2.0, np.float32))
     assert off(revised(room, shown, ~there), empty).max() < 12
 
