@@ -69,8 +69,8 @@ class CheckKeypoints(Stage):
         apart, count = off > self.apart_m, len(track.frame)
         for joint in np.flatnonzero(apart.any(axis=0)).tolist():
             LOG.warning(APART, joints[joint], apart[:, joint].sum(), count, 100 * np.nanmax(off[:, joint]))
-        notes = [
-            f"frame {track.frame[row]}: keypoints have {joints[joint]} {100 * off[row, joint]:.0f} cm away"
+        notes = [  # in the same words, so that the report says each once, with its frames
+            f"frame {track.frame[row]}: keypoints have {joints[joint]} elsewhere"
             for row, joint in np.argwhere(apart).tolist()
         ]
         return replace(track, doubted=track.doubted | apart.any(axis=1), notes=in_order([*track.notes, *notes]))

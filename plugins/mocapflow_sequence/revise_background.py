@@ -96,7 +96,7 @@ def revised(before: Learnt, pictures: U8, away: Bool) -> Learnt:
     (usual,) = dominant_colours(pictures, 1, away)
     noise = np.median(usual.spread, axis=(0, 1))
     enough = usual.share >= max(LEAST_SHARE, LEAST / len(pictures))
-    lit = ((shown(picture, noise), enough & there) for picture, there in zip(pictures, away, strict=True))
+    lit = ((shown(picture, noise), there) for picture, there in zip(pictures, away, strict=True))
     found = Colours(*brightest(Learnt(usual.mean, usual.spread), lit), usual.share)
     kept = Learnt(before.mean.copy(), before.spread.copy())
     kept.take(found, enough & ~_confirmed(before, found))

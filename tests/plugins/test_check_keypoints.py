@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from keypoint_recording import copy_demo, template, write
 from mocapflow_recovery.check_keypoints import CheckKeypoints
+from mocapflow_sequence.join import cut
 from results_scene import demo_scene, stepping, tube
 
 from mocapflow.geometry.kinematics import joint_centres
@@ -20,10 +21,10 @@ SCENE = Scene(cameras=demo_scene().cameras, body=BODY)
 KNEE, ANKLE = BODY.screw_names.index("knee_l.flexion"), BODY.joint("ankle_l")
 
 
-def astray(*rows, by=0.8):
-    """The track with a knee bent by so much (rad) more in some rows."""
+def astray(*rows, bent=KNEE):
+    """The track with a joint bent more in some rows."""
     angles = TRUE.angles.copy()
-    angles[list(rows), KNEE] += by
+    angles[list(rows), bent] += 0.8
     return replace(TRUE, angles=angles)
 
 
@@ -55,15 +56,20 @@ def test_a_leg_elsewhere_is_doubted_and_told(recording, caplog):
     track = replace(astray(2, 4), doubted=TRUE.frame == 0)
     checked = CheckKeypoints().run(track, recording, SCENE)
     assert np.flatnonzero(checked.doubted).tolist() == [0, 2, 4]
-    first, second, third, last = checked.notes
+    first, *found, last = checked.notes
     assert (first, last) == TRUE.notes
-    for row, note in ((2, second), (4, third)):
-        head, _, said = note.partition(": keypoints have ankle_l ")
-        assert head == f"frame {row}"
-        assert float(said.removesuffix(" cm away")) == pytest.approx(off_cm(track)[row], abs=1.5)
+    assert found == [f"frame {row}: keypoints have ankle_l elsewhere" for row in (2, 4)]
     (message,) = caplog.messages
-    assert message.startswith("keypoints have ankle_l elsewhere in 2 of 6 frames, up to ")
+    told, _, most = message.partition(" in 2 of 6 frames, up to ")
+    assert told == "keypoints have ankle_l elsewhere"
+    assert float(most.partition(" cm away")[0]) == pytest.approx(off_cm(track).max(), abs=1.5)
     np.testing.assert_array_equal(checked.angles, track.angles)
+
+
+@pytest.mark.parametrize("bent, end", [("hip_r.flexion", "ankle_r"), ("elbow_l.flexion", "wrist_l")])
+def test_the_ends_of_limbs_are_compared(recording, bent, end):
+    checked = CheckKeypoints().run(astray(2, bent=BODY.screw_names.index(bent)), recording, SCENE)
+    assert set(checked.notes) == {*TRUE.notes, f"frame 2: keypoints have {end} elsewhere"}
 
 
 def test_what_counts_as_elsewhere_is_a_setting(recording):
@@ -74,10 +80,11 @@ def test_what_counts_as_elsewhere_is_a_setting(recording):
     assert near.doubted.any() and not far.doubted.any()
 
 
-def test_a_recording_without_keypoints_is_left_alone(recording):
+def test_a_recording_without_keypoints_is_left_alone(recording, caplog):
     track = astray(2)
     none = replace(recording, keypoint_folders=(None,) * 4)
     assert CheckKeypoints().run(track, none, SCENE) is track
+    assert not caplog.messages
 
 
 def test_joints_near_a_garment_are_not_compared(recording):
@@ -124,8 +131,15 @@ def test_three_cameras_have_to_agree(folder, tmp_path, by):
 
 @pytest.mark.parametrize("by", [0.1, 1.0, 10.0])
 def test_cameras_agree_but_for_usual_errors(folder, tmp_path, by):
-    offs = [(-4.0, 0.0), (4.0, 0.0), (-4.0, 0.0), (4.0, 0.0)]
+    """Three do; the fourth marks something else."""
+    offs = [(-7.0, 0.0), (7.0, 0.0), (90.0, -70.0), (7.0, 0.0)]
     assert np.flatnonzero(seen_larger(folder, tmp_path, offs, by)).tolist() == [2]
+
+
+def test_frames_are_those_of_the_videos(recording):
+    later = cut(astray(4), TRUE.frame >= 3)
+    checked = CheckKeypoints().run(later, recording, SCENE)
+    assert checked.frame[checked.doubted].tolist() == [4]
 
 
 def test_lost_frames_are_guesses_anyway(recording, caplog):
