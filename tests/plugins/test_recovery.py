@@ -318,12 +318,13 @@ def test_a_leg_stays_where_an_arm_was_lost() -> None:
     leg, arm = (np.flatnonzero(body.screw_joint == body.joint(name)) for name in ("hip_l", "shoulder_r"))
 
     def mismatch(poses):
-        return np.array([100.0 * (not p.angles[arm].any()) + 5.0 * (not p.angles[leg].any()) for p in poses])
+        return np.array([100.0 * (not p.angles[arm].any()) + 5.0 * (not p.angles[leg].any())
+                         + 50.0 * (p.root is fitted.root) for p in poses])  # fmt: skip
 
     fitted = Pose(root=POSE.root, angles=np.zeros(len(body.twists)))
-    found = Pose(root=POSE.root, angles=fitted.angles + 0.1)
+    found = Pose(root=np.eye(4), angles=fitted.angles + 0.1)
     kept = without_idle_parts(mismatch, found, fitted, body, 0.1)
-    assert kept.angles[arm].all() and not kept.angles[leg].any()
+    assert kept.angles[arm].all() and not kept.angles[leg].any() and kept.root is found.root
     assert without_idle_parts(mismatch, found, fitted, body, 0.01).angles[leg].all()
     nothing_off = without_idle_parts(lambda poses: np.zeros(len(poses)), found, fitted, body, 0.1)
     assert not nothing_off.angles.any()  # all parts are idle

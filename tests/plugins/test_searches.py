@@ -42,12 +42,12 @@ class Told(NamedTuple):
         return self.distances(poses, "area")
 
 
-def found(way, *table, seen=SEEN, asked=None, fitted=FITTED):
+def found(way, *table, seen=SEEN, asked=None, fitted=FITTED, gain=0.1):
     """Return the angles that a search ends at whose samples are its beginnings themselves and what was seen."""
     plan = Plan(Spread(0.0, 0.0, 0.0), (1.0,), 1, np.atleast_2d(seen), 1)
     fit, predicted, before, long_ago = (Pose(root=np.eye(4), angles=a) for a in (fitted, PREDICTED, BEFORE, LONG_AGO))
     scorer = Told(list(table), [] if asked is None else asked, scenes.tiny_past(SCENE, long_ago, before))
-    return way(Searches(scorer, plan, predicted, fit, 0.1), np.random.default_rng(0)).angles
+    return way(Searches(scorer, plan, predicted, fit, gain), np.random.default_rng(0)).angles
 
 
 near = partial(Searches.local, spread=1e-9)
@@ -66,8 +66,9 @@ def test_a_wide_search_begins_at_the_best_pose_at_hand(angles) -> None:
 
 @pytest.mark.parametrize("angles", [FITTED, PREDICTED, BEFORE], ids=["fitted", "predicted", "before"])
 def test_a_limb_alone_is_sampled_around_where_it_is_fitted_predicted_and_was(angles) -> None:
-    wanted = with_leg(FITTED, angles)
-    np.testing.assert_array_equal(found(leg_alone, (wanted, 1.0)), wanted)
+    foot = np.where(np.arange(COUNT) == LEG[-1], SEEN, np.nan)
+    wanted = np.where(np.isnan(foot), with_leg(FITTED, angles), foot)
+    np.testing.assert_array_equal(found(leg_alone, (wanted, 1.0), seen=foot), wanted)
 
 
 def test_the_other_leg_stays_where_one_is_looked_for_alone() -> None:
@@ -106,6 +107,12 @@ def test_what_need_not_have_moved_is_as_it_was_fitted_or_else_predicted(way) -> 
     np.testing.assert_array_equal(found(way, *table), FITTED)
     if way is wide:
         np.testing.assert_array_equal(found(way, (PREDICTED, 1.0), (with_leg(PREDICTED, SEEN), 0.99)), PREDICTED)
+
+
+@pytest.mark.parametrize(("gain", "angles"), [(0.1, with_leg(FITTED, SEEN)), (0.01, SEEN)])
+def test_a_leg_that_mends_less_than_its_share_stays_as_it_was_fitted(gain, angles) -> None:
+    table = (SEEN, 1.0), (with_leg(FITTED, SEEN), 1.5), (with_leg(SEEN, FITTED), 8.5)
+    np.testing.assert_array_equal(found(wide, *table, gain=gain), angles)
 
 
 def test_somebody_turned_round_looks_the_other_way_where_they_stand() -> None:
