@@ -49,7 +49,7 @@ def largest_changes(frame: Frame, rooms: Sequence[SmallRoom]) -> tuple[list[Bool
 
     masks, cameras = [], []
     for number in np.flatnonzero(frame.usable).tolist():
-        changed = changes(frame.images[number], rooms[number])
+        changed = changes(frame.images[number], frame.hidden_in(number), rooms[number])
         opened = cv2.morphologyEx(changed.view(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
         _, label, stats, _ = cv2.connectedComponentsWithStats(opened, connectivity=8)
         stats[0, cv2.CC_STAT_AREA] = 0

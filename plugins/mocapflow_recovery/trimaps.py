@@ -83,13 +83,11 @@ def trimaps(
     for number in np.flatnonzero(frame.usable).tolist():
         camera, factor, plate = rooms[number]
         model, pixel_m = covered(surface, camera), 1 / magnification(camera, middle)
-        image, hidden = frame.images[number], frame.hidden_in(number)
-        small = crops.shrink(image, factor)
+        small, visible = crops.shrink(frame.images[number], factor), _visible(frame.hidden_in(number), factor)
         floor = floor_around(surface, camera)
         if no_shadow is not None:
             floor = floor & ~crops.shrink_mask(no_shadow[number], factor)
         changed, same = _compared(small, plate, floor)
-        visible = True if hidden is None else crops.shrink(hidden.astype(np.float32), factor) == 0
         person = _near(changed & visible, model, near_m / pixel_m)
         seen, expected = np.count_nonzero(person), np.count_nonzero(model)
         if seen < MOST * expected:
@@ -100,10 +98,18 @@ def trimaps(
     return found
 
 
-def changes(image: U8, room: SmallRoom) -> Bool:
-    """Return where (h, w) an image (H, W, 3) differs from the empty room, the shadows of whoever is there included."""
+def changes(image: U8, hidden: Bool | None, room: SmallRoom) -> Bool:
+    """Return where (h, w) an image (H, W, 3), but for what hides the scene, differs from the empty room.
+
+    The shadows of whoever is there are included.
+    """
     small = crops.shrink(image, room.factor)
-    return _compared(small, room.plate, np.zeros(small.shape[:2], bool))[0]
+    return _compared(small, room.plate, np.zeros(small.shape[:2], bool))[0] & _visible(hidden, room.factor)
+
+
+def _visible(hidden: Bool | None, factor: int) -> Bool | bool:
+    """Return where (h, w) no pixel of a mask (H, W) hides the scene; True: everywhere."""
+    return True if hidden is None else np.asarray(crops.shrink(hidden.astype(np.float32), factor) == 0)
 
 
 def _compared(image: U8, plate: Plate, floor: Bool) -> tuple[Bool, Bool]:

@@ -83,6 +83,17 @@ def test_the_largest_change_of_each_usable_view_is_the_person():
     assert masks[2].sum() > 500 and not masks[2][:12, :12].any()
 
 
+def test_what_hides_the_scene_is_not_the_person():
+    scene = scenes.tiny_scene()
+    frame, bar = pictures.tiny_frame(scene, scenes.tiny_pose(scene)), np.zeros((240, 320), bool)
+    bar[:, :80] = True  # beside the person, larger than they are
+    images = tuple(np.where(bar[..., None], np.uint8(0), image) for image in frame.images)
+    hidden = replace(frame, images=images, hidden=(bar,) * len(images))
+    rooms = small_rooms(scene.background, scene.cameras)
+    for mask, without in zip(largest_changes(hidden, rooms)[0], largest_changes(frame, rooms)[0], strict=True):
+        assert not mask[:, :40].any() and mask.sum() > 0.9 * without.sum()
+
+
 def test_without_plates_it_says_what_else_there_is(tmp_path):
     (tmp_path / "videos").symlink_to(SKIRT / "videos")
     (tmp_path / "cameras.toml").symlink_to(SKIRT / "cameras.toml")
