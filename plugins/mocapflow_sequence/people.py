@@ -15,7 +15,7 @@ from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, Bool
 
 LOG = logging.getLogger("mocapflow")
-REACH = 0.06  # of the diagonal of a person's keypoints, 10 cm of somebody who stands: flesh, and errors of keypoints
+REACH = 0.04  # of the diagonal of a person's keypoints, 7 cm of somebody who stands: flesh, and errors of keypoints
 PARTS = (  # of a person: the convex hull of each is filled
     ("head_top", "nose", "ear_l", "ear_r", "shoulder_l", "shoulder_r"),
     ("shoulder_l", "shoulder_r", "hip_l", "hip_r"),
