@@ -37,7 +37,7 @@ def figure(**changes):
     (110, 160, True), (50, 160, True),  # shanks
     (80, 130, True),  # a skirt between the knees
     (80, 175, False),  # between the feet
-    (110 + REACH_PX - 1, 85, True), (110 + REACH_PX + 1, 85, False),  # beside a forearm
+    (110 + REACH_PX - 2, 85, True), (110 + REACH_PX + 2, 85, False),  # beside a forearm
     (130, 20, False),
 ])  # fmt: skip
 def test_a_person_covers_limbs_trunk_and_what_hangs_between_the_knees(x, y, shown):
