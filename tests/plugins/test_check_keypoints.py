@@ -21,10 +21,10 @@ SCENE = Scene(cameras=demo_scene().cameras, body=BODY)
 KNEE, ANKLE = BODY.screw_names.index("knee_l.flexion"), BODY.joint("ankle_l")
 
 
-def astray(*rows, bent=KNEE):
-    """The track with a joint bent more in some rows."""
+def astray(*rows, bent=KNEE, by=0.7):
+    """The track with a joint bent more in some rows, by 40 degrees."""
     angles = TRUE.angles.copy()
-    angles[list(rows), bent] += 0.8
+    angles[list(rows), bent] += by
     return replace(TRUE, angles=angles)
 
 
@@ -60,16 +60,35 @@ def test_a_leg_elsewhere_is_doubted_and_told(recording, caplog):
     assert (first, last) == TRUE.notes
     assert found == [f"frame {row}: keypoints have ankle_l elsewhere" for row in (2, 4)]
     (message,) = caplog.messages
-    told, _, most = message.partition(" in 2 of 6 frames, up to ")
+    told, _, most = message.partition(" in 2 of 6 frames, by up to ")
     assert told == "keypoints have ankle_l elsewhere"
-    assert float(most.partition(" cm away")[0]) == pytest.approx(off_cm(track).max(), abs=1.5)
+    assert float(most.partition(" cm:")[0]) == pytest.approx(off_cm(track).max(), abs=1.5)
     np.testing.assert_array_equal(checked.angles, track.angles)
 
 
-@pytest.mark.parametrize("bent, end", [("hip_r.flexion", "ankle_r"), ("elbow_l.flexion", "wrist_l")])
-def test_the_ends_of_limbs_are_compared(recording, bent, end):
-    checked = CheckKeypoints().run(astray(2, bent=BODY.screw_names.index(bent)), recording, SCENE)
+@pytest.mark.parametrize("bent, by, end", [("hip_r.flexion", 0.4, "ankle_r"), ("elbow_l.flexion", 0.7, "wrist_l")])
+def test_the_ends_of_limbs_are_compared(recording, bent, by, end):
+    checked = CheckKeypoints().run(astray(2, bent=BODY.screw_names.index(bent), by=by), recording, SCENE)
     assert set(checked.notes) == {*TRUE.notes, f"frame 2: keypoints have {end} elsewhere"}
+
+
+def test_a_foot_turned_is_doubted_and_told(recording, caplog):
+    """Its ankle is where it is marked."""
+    turned = astray(1, 3, bent=BODY.screw_names.index("ankle_r.dorsiflexion"), by=np.radians(50))
+    checked = CheckKeypoints().run(turned, recording, SCENE)
+    assert np.flatnonzero(checked.doubted).tolist() == [1, 3]
+    assert set(checked.notes) == {*TRUE.notes, *(f"frame {row}: keypoints have ankle_r turned otherwise" for row in (1, 3))}
+    (message,) = caplog.messages
+    told, _, most = message.partition(" in 2 of 6 frames, by up to ")
+    assert told == "keypoints have ankle_r turned otherwise"
+    assert float(most.partition(" degrees:")[0]) == pytest.approx(50, abs=6)
+    assert not CheckKeypoints(turned_deg=60).run(turned, recording, SCENE).doubted.any()
+
+
+def test_feet_are_not_compared_where_toes_are_not_marked(folder, tmp_path):
+    turned = astray(1, bent=BODY.screw_names.index("ankle_r.dorsiflexion"), by=np.radians(50))
+    toeless = spoilt(folder, tmp_path, lambda number, points: points[22:25].fill(0))
+    assert not CheckKeypoints().run(turned, toeless, SCENE).doubted.any()
 
 
 def test_what_counts_as_elsewhere_is_a_setting(recording):
