@@ -84,7 +84,8 @@ class CheckKeypoints(Stage):
                 found.append(Difference(f"{joint} elsewhere", 100 * off, 100 * self.apart_m, "cm"))
             elif (ankle := joint.replace("toe", "ankle")) in joints:
                 feet = [each[:, row] - each[:, joints.index(ankle)] for each in (tracked, marked)]
-                found.append(Difference(f"{ankle} turned otherwise", _degrees_between(*feet), self.turned_deg, "degrees"))
+                turned = _degrees_between(*feet)
+                found.append(Difference(f"{ankle} turned otherwise", turned, self.turned_deg, "degrees"))
         return found
 
 
