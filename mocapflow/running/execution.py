@@ -3,34 +3,33 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from mocapflow.config.named_parts import whereabouts
 from mocapflow.config.pipeline import Pipeline
 from mocapflow.data import FrameResult
 from mocapflow.guards.outputs import made_of
 from mocapflow.interrupts import check
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import silent
-from mocapflow.results import Files, RunFolder
+from mocapflow.results import RunFolder
 from mocapflow.running import damage
 from mocapflow.running.component_failures import FAILURE_LOG, naming_failures
 from mocapflow.running.dressing import body_named, sewn
+from mocapflow.running.ledger import Ledger, Made
 from mocapflow.running.progress import Progress
 from mocapflow.running.recipes import Step
 from mocapflow.running.warning_log import warnings_logged
 from mocapflow.running.wiring import Itself, Source, made_by
 from mocapflow.scene import Scene
-from mocapflow.storage.artifacts import Artifact, made_otherwise, versions, with_versions
+from mocapflow.storage.artifacts import Artifact, with_versions
 from mocapflow.storage.checkpoint import Checkpoint
 from mocapflow.storage.locks import Lock
 from mocapflow.storage.rows import Corrupted
 from mocapflow.storage.store import Report, Store
-from mocapflow.storage.traces import untraced
 
 
 def is_hit(step: Step, artifact: Artifact) -> bool:
@@ -38,24 +37,10 @@ def is_hit(step: Step, artifact: Artifact) -> bool:
     return artifact.complete and (not step.chain or artifact.frames >= step.frames)
 
 
-def lacking_trace(step: Step, artifact: Artifact) -> str:
-    """Return which frames of the store have no trace, where a stage is to keep one, for people; empty: none."""
-    return untraced(artifact, step.recording.indices) if step.named.stage.keeps_turns else ""
-
-
 def find_hit(step: Step, store: Store) -> Artifact | None:
     """Return the artifact that holds all that a stage would make, None where it has to be made."""
     found = store.find(step.key) if step.stored else None
     return found if found is not None and is_hit(step, found) else None
-
-
-class Made(NamedTuple):
-    """What a stage has made, and what that took."""
-
-    value: Any
-    warnings: Sequence[str]
-    cpu_s: float
-    wall_s: float
 
 
 class Execution:
@@ -72,16 +57,15 @@ class Execution:
         self._naming_failures = partial(naming_failures, registry=pipeline.registry, log=self._log)
         self._results: dict[str, Any] = {}
         self._scenes: dict[tuple[str | None, str | None], Scene] = {}
-        self.entries: dict[str, Mapping[str, Any]] = {}  # per finished stage
-        self.files: list[Path] = []  # that stages have written
+        self.ledger = Ledger(pipeline, steps, report)
 
     def finish(self, step: Step) -> None:
         """Make sure that the result of a stage exists; a cached one is usually not even read."""
-        if step.label in self.entries:
+        if step.label in self.ledger.entries:
             return
         found = self._find(step)
         if found and not step.named.stage.looks_back:
-            self._enter_found(step, found)
+            self.ledger.enter_found(step, found)
         else:
             self._result(step.label)
 
@@ -111,7 +95,7 @@ class Execution:
             Corrupted: it can't be read back.
         """
         result = self._store.load(found, step.frames if step.chain else None)
-        self._enter_found(step, found)
+        self.ledger.enter_found(step, found)
         if step.named.stage.looks_back:
             step.named.stage.look_back(result)
         return result
@@ -119,7 +103,7 @@ class Execution:
     def _made(self, step: Step) -> Any:
         """Return a result that this run makes, or that another one has made while this one waited to write it."""
         if not step.stored:
-            return self._enter_made(step, self._run(step))
+            return self._entered(step, self._run(step))
         with self._store.writer(step.key, f"{step.label}-{step.key[:6]}", self._report) as lock:
             started = self._started(step)
             while started is not None and is_hit(step, started):  # made by another run, or elsewhere, meanwhile
@@ -127,7 +111,11 @@ class Execution:
                     return self._read(step, started)
                 except Corrupted as error:
                     started = self._repairs.mended(step, started, error)
-            return self._enter_made(step, self._chain(step, started, lock) if step.chain else self._whole(step))
+            return self._entered(step, self._chain(step, started, lock) if step.chain else self._whole(step))
+
+    def _entered(self, step: Step, made: Made) -> Any:
+        self.ledger.enter_made(step, made)
+        return made.value
 
     def _started(self, step: Step) -> Artifact | None:
         """Return what there is to go on from, for who may write it; nothing where all is to be made anew."""
@@ -150,7 +138,7 @@ class Execution:
         if started is None or not started.frames:
             return self._run(step, self._checkpoint(step, self._store.begin(step.label, step.key, step.recipe), lock))
         self._report(f"{step.label}: going on after {started.frames} frames")
-        mixed = self._warned_of(step, started)
+        mixed = self.ledger.warned_of(step, started)
         try:
             return self._run(step, self._checkpoint(step, with_versions(started), lock), mixed)
         except Corrupted as error:
@@ -209,7 +197,7 @@ class Execution:
             case "checkpoint":
                 given = checkpoint
             case "run folder":
-                given = RunFolder(path=self._out, recipe=self._recipe(), watch=watch)
+                given = RunFolder(path=self._out, recipe=self.ledger.recipe(), watch=watch)
             case str():
                 given = self._result(source)
         return replace(given, indices=step.recording.indices, watch=watch) if isinstance(given, Recording) else given
@@ -222,55 +210,5 @@ class Execution:
             garment = sewn(self._pipeline, body, self._log)
             cameras = self._result(step.rig).cameras if step.rig else step.recording.cameras
             scene = self._scenes[place] = Scene(cameras=cameras, body=body, garment=garment)
-            self._warn(scene.warnings)
+            self.ledger.warn(scene.warnings)
         return self._scenes[place]
-
-    def _enter_found(self, step: Step, found: Artifact) -> None:
-        if step.label in self.entries:
-            return
-        self._report(f"{step.label}: from the store")
-        mixed = self._warned_of(step, found)
-        self._warn(found.warnings)
-        self._enter(step, Made(None, [*found.warnings, *mixed], 0.0, 0.0), cached=True)
-
-    def _enter_made(self, step: Step, made: Made) -> Any:
-        self._enter(step, made, cached=False)
-        self.files += made.value.paths if isinstance(made.value, Files) else ()
-        return made.value
-
-    def _enter(self, step: Step, made: Made, cached: bool) -> None:
-        self.entries[step.label] = {
-            "label": step.label, "key": step.key, "cached": cached, "warnings": list(made.warnings),
-            "seconds": made.cpu_s, "wall_seconds": made.wall_s,
-        }  # fmt: skip
-        self._pipeline.registry.observers.stage_done(step.label, step.key, cached)
-
-    def _recipe(self) -> dict[str, Any]:
-        pipeline = self._pipeline
-        return {
-            "pipeline": pipeline.name,
-            "recording": whereabouts(pipeline.recording),
-            "frames": {"start": pipeline.start, "stop": pipeline.stop, "step": pipeline.step},
-            "scale": pipeline.scale,
-            "versions": versions(),
-            "settings": {label: step.recipe["component"] for label, step in self._steps.items()},
-            "stages": dict(self.entries),
-        }
-
-    def _warned_of(self, step: Step, artifact: Artifact) -> list[str]:
-        """Report, and return, what of a result was made with other versions, and which frames lack a trace."""
-        indices, said = step.recording.indices, list[str]()
-        for first, last, how in made_otherwise(artifact):
-            own = indices[first:last]
-            if own or not step.chain:
-                what = f"frames {own[0]}–{own[-1]} of {step.label}" if step.chain else step.label
-                said.append(f"{what} were made with {how}")
-        if lack := lacking_trace(step, artifact):
-            how = "tracked without keep: trace; --fresh tracks all anew"
-            said.append(f"{step.label}: frames {lack} have no trace, for they were {how}")
-        self._warn(said)
-        return said
-
-    def _warn(self, warnings: Iterable[str]) -> None:
-        for warning in warnings:
-            self._report(f"warning: {warning}")

@@ -17,7 +17,8 @@ from mocapflow.io.paths import for_opencv
 from mocapflow.records import silent
 from mocapflow.running.component_failures import FAILURE_LOG
 from mocapflow.running.dressing import body_named, sewn
-from mocapflow.running.execution import Execution, find_hit, is_hit, lacking_trace
+from mocapflow.running.execution import Execution, find_hit, is_hit
+from mocapflow.running.ledger import lacking_trace
 from mocapflow.running.recipes import Step, steps_of
 from mocapflow.running.wiring import SUPPLIED, Source
 from mocapflow.storage.shared import open_store
@@ -101,8 +102,9 @@ class Prepared:
             for step in self.steps:
                 if only is None or step.label == only:
                     execution.finish(step)
+        ledger = execution.ledger
         return RunSummary(
-            out=out, store=self.store.path, stages=tuple(execution.entries.values()), files=tuple(execution.files)
+            out=out, store=self.store.path, stages=tuple(ledger.entries.values()), files=tuple(ledger.files)
         )
 
     def _check_inputs(self, fresh: bool, log: Path | None = None) -> None:

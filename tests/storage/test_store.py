@@ -893,12 +893,12 @@ def test_a_failed_run_gives_its_lock_back(tmp_path, path, monkeypatch):
 
 @pytest.mark.parametrize("library", ["numpy", "open3d"])  # the latter makes the body of fewer faces
 def test_other_versions_are_told(tmp_path, path, monkeypatch, library):
-    from mocapflow.running import execution
+    from mocapflow.running import ledger
     from mocapflow.storage import artifacts
 
     real = artifacts.versions()
     run_tiny(path, tmp_path, frames=5)
-    for module in (artifacts, execution):
+    for module in (artifacts, ledger):
         monkeypatch.setattr(module, "versions", lambda: real | {library: "9.9"})
     said = f"frames 0–4 of track were made with {library} {real[library]}, now 9.9"
     for _ in range(2):  # gone on with, then all done: the mixture is still told
@@ -906,7 +906,7 @@ def test_other_versions_are_told(tmp_path, path, monkeypatch, library):
         assert f"warning: {said}" in lines
         (track,) = [stage for stage in summary.stages if stage["label"] == "track"]
         assert track["warnings"] == [said]  # in run.json, too
-    for module in (artifacts, execution):
+    for module in (artifacts, ledger):
         monkeypatch.setattr(module, "versions", lambda: real | {library: "10"})
     _, lines = run_tiny(path, tmp_path)
     assert f"warning: frames 5–11 of track were made with {library} 9.9, now 10" in lines
