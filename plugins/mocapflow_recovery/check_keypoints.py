@@ -27,8 +27,8 @@ TOE = "big_toe"  # the keypoint that tells, with the ankle's, where a foot point
 AGREES = 0.1  # a view supports a keypoint if more of its confidence counts: within three times `halving_px`
 VIEWS = 3  # that have to support it, where so many have keypoints
 APART = (
-    "keypoints have %s in %d of %d frames, by up to %.0f %s: these frames are doubted. Either the limb is lost or the"
-    " keypoints are wrong: look at the overlay"
+    "keypoints have %s in %d of %d frames, by up to %.0f %s: these frames are doubted. Look at the overlay: either the"
+    " keypoints are wrong or the limb is lost; a start by them may find it: --set stages.start=start_from_keypoints"
 )
 
 
