@@ -143,7 +143,7 @@ def _angles_of(
         if len(index) == 3:
             yield float(three_point(places[index])) + angle.offset, _three_point_gradient(places[index], moves[index])
         else:
-            pelvis = int(body.parents[index[0]])
+            pelvis = max(int(body.parents[index[0]]), 0)  # a leg alone hangs on nothing
             turn = np.hstack([np.eye(3), np.zeros((3, 3)), np.where(below[:, pelvis], screws[:, :3].T, 0.0)])
             seen_from = sagittal @ joints[pelvis, :3, :3].T  # the pelvis' forward and up, in the world
             yield _flexion(places[index], moves[index], seen_from, turn)

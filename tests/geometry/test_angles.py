@@ -170,6 +170,25 @@ def test_nothing_is_known_of_an_angle_that_no_screw_changes() -> None:
     assert np.isfinite(series.sd[0, 1:]).all()
 
 
+def test_a_leg_alone_hangs_on_nothing() -> None:
+    """No joint says where the hip is flexed from: what the toes do is none of it."""
+    body = stick_body(keep=("pelvis", "hip", "knee", "ankle", "toe"))
+    leg = [body.joint(f"{name}_r") for name in ("hip", "knee", "ankle", "toe")]
+    rows = np.isin(body.screw_joint, leg[1:])
+    alone = replace(
+        body, joint_names=tuple(body.joint_names[k] for k in leg), parents=np.arange(-1, 3, dtype=np.int32),
+        positions=body.positions[leg], twists=body.twists[rows], screw_joint=np.repeat([1, 2, 3], 3).astype(np.int32),
+        screw_names=tuple(np.array(body.screw_names)[rows]), limits=body.limits[rows],
+        rest_spread=body.rest_spread[rows],
+    )  # fmt: skip
+    poses = np.zeros((2, 9))
+    poses[1, 6:] = 0.5  # of the toes
+    found = angles.measure(alone, np.tile(np.eye(4), (2, 1, 1)), poses, np.tile(np.eye(15), (2, 1, 1)))
+    hip = found.names.index("hip_flexion_r")
+    assert found.value[0, hip] == found.value[1, hip]
+    assert np.isnan(found.sd[:, hip]).all()
+
+
 def test_left_is_level_whatever_the_hips_are() -> None:
     hips = Skeleton(("hip_l", "hip_r"), np.array([-1, 0], np.int32), np.array([[0.1, 0, 1.0], [-0.1, 0, 0.9]]))
     np.testing.assert_allclose(body_directions(hips), [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-12)
