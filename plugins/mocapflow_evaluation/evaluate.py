@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
 
@@ -108,6 +109,8 @@ def evaluate_run(run_folder: Path, truth: Path, longest_lag_s: float = LONGEST_L
 def evaluate(own: TrackedMotion, path: Path, folder: Path, longest_lag_s: float = LONGEST_LAG_S) -> Evaluation:
     """Compare with a reference file; writes tables, what was found of both systems, and pictures into a run folder."""
     reference = read_reference(path)
+    if path.resolve() == (folder / layout.KEYPOINTS).resolve():  # triangulated with the cameras of the run
+        reference = replace(reference, in_our_world=True)
     known = cycles.shared(own.columns, at_our_frames(reference, own.columns))
     alignment = align(own.columns, reference, longest_lag_s)
     aligned = at_our_frames(reference, own.columns, alignment.worth)
