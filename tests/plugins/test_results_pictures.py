@@ -225,6 +225,20 @@ def test_report_fetches_nothing(page: str) -> None:
     assert "url(" not in style and "@import" not in style
 
 
+def test_report_counts_the_frames_of_the_run_and_their_rate(
+    scene: Scene, track: Track, recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every third of 30 pictures a second."""
+    pictures = [layout.place(tmp_path, part) for part in (layout.PLOT, layout.OVERLAP)]
+    for picture in pictures:
+        picture.touch()
+    monkeypatch.setattr("mocapflow_report.report.draw", lambda *_: pictures)
+    monkeypatch.setattr("mocapflow_report.report.stills", lambda *_: [])
+    sparse = replace(recording, indices=range(0, 12, 3))
+    Report().run(track=track, scene=scene, recording=sparse, run_folder=RunFolder(path=tmp_path, recipe={}))
+    assert "4 frames, 4 cameras, 10 per second" in (tmp_path / layout.REPORT).read_text()
+
+
 @pytest.mark.long
 def test_report_without_reference(scene: Scene, track: Track, recording: Recording, page: str, tmp_path: Path) -> None:
     run_folder = RunFolder(path=tmp_path, recipe={})
