@@ -27,7 +27,7 @@ class WriteFormats(Stage):
     """Writes the track in further formats, and nothing else: what `mocapflow export` does with a finished run."""
 
     name: ClassVar[str] = "write_formats"
-    formats: tuple[Format, ...] = ("csv", "mot", "trc")  # those beyond these three need their extra
+    formats: tuple[Format, ...] = ("csv", "mot", "trc")  # those beyond these three, but for bvh, need their extra
 
     def need(self, recording: Recording) -> None:
         """Raise if a package that a format is written with is not installed."""
