@@ -45,9 +45,13 @@ def definitions(joint_names: tuple[str, ...]) -> tuple[Definition, ...]:
     return tuple(d for d in _all_definitions() if set(d.points) <= set(joint_names))
 
 
-def unmeasured(joint_names: tuple[str, ...]) -> str:
-    """Say which angles a skeleton with these joints lacks, and for want of which joints; "" where it has all."""
+def unmeasured(joint_names: tuple[str, ...], whole: bool = True) -> str:
+    """Say which angles a skeleton with these joints lacks, and for want of which joints; "" where it has all.
+
+    Of a part of a skeleton, those are told of which it has some joint.
+    """
     lost = [d for d in _all_definitions() if not set(d.points) <= set(joint_names)]
+    lost = [d for d in lost if whole or not set(d.points).isdisjoint(joint_names)]
     joints = dict.fromkeys(point for d in lost for point in d.points if point not in joint_names)
     said = f"no angles {', '.join(d.name for d in lost)}: the skeleton has no joints named {', '.join(joints)}"
     return said if lost else ""

@@ -64,6 +64,9 @@ def test_what_is_not_measured_is_said() -> None:
     assert Scene(cameras=(), body=legs).warnings == (f"body: {angles.unmeasured(legs.joint_names)}",)
     cut = np.ones(len(legs.cut), bool)  # as `part: legs` leaves it
     assert Scene(cameras=(), body=replace(legs, cut=cut)).warnings == ()
+    named = tuple(name.replace("toe", "ball") for name in legs.joint_names)
+    said = "body: no angles ankle_l, ankle_r: the skeleton has no joints named toe_l, toe_r"
+    assert Scene(cameras=(), body=replace(legs, cut=cut, joint_names=named)).warnings == (said,)
 
 
 @pytest.mark.parametrize("clip", ["skirt_steps", "shorts_steps"])
