@@ -8,7 +8,7 @@ from __future__ import annotations
 from figures import first_frame, write
 from mocapflow_report.room import Room
 
-from mocapflow.data import NO_CLOTH
+from mocapflow.data import NO_CLOTH, PoseBatch
 
 SIZE = (640, 480)
 
@@ -17,7 +17,8 @@ def main() -> None:
     """Write the panels."""
     model, _, state = first_frame()
     pose, scene = state.estimate.pose, model.scene
-    room, body = Room(scene, pose.root[None], SIZE), scene.bare(scene.surface(pose, state.cloth))
+    poses = PoseBatch(root=pose.root[None], angles=pose.angles[None])
+    room, body = Room(scene, poses, SIZE), scene.bare(scene.surface(pose, state.cloth))
     write({"with cloth": room.picture(body, state.cloth.vertices), "without": room.picture(body, NO_CLOTH.vertices)})
 
 

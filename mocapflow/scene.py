@@ -29,8 +29,7 @@ class Scene:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a user should know of the person and the clothes; also in run.json."""
-        # a part of a body lacks what it was told to
-        lacking = "" if self.body.cut.any() else unmeasured(self.body.joint_names)
+        lacking = unmeasured(self.body.joint_names, whole=not self.body.cut.any())
         worn = () if self.garment is None else tuple(f"{self.garment.name}: {said}" for said in self.garment.repairs)
         return (f"body: {lacking}", *worn) if lacking else worn
 

@@ -45,9 +45,13 @@ def definitions(joint_names: tuple[str, ...]) -> tuple[Definition, ...]:
     return tuple(d for d in _all_definitions() if set(d.points) <= set(joint_names))
 
 
-def unmeasured(joint_names: tuple[str, ...]) -> str:
-    """Say which angles a skeleton with these joints lacks, and for want of which joints; "" where it has all."""
+def unmeasured(joint_names: tuple[str, ...], whole: bool = True) -> str:
+    """Say which angles a skeleton with these joints lacks, and for want of which joints; "" where it has all.
+
+    Of a part of a skeleton, those are told of which it has some joint.
+    """
     lost = [d for d in _all_definitions() if not set(d.points) <= set(joint_names)]
+    lost = [d for d in lost if whole or not set(d.points).isdisjoint(joint_names)]
     joints = dict.fromkeys(point for d in lost for point in d.points if point not in joint_names)
     said = f"no angles {', '.join(d.name for d in lost)}: the skeleton has no joints named {', '.join(joints)}"
     return said if lost else ""
@@ -143,7 +147,7 @@ def _angles_of(
         if len(index) == 3:
             yield float(three_point(places[index])) + angle.offset, _three_point_gradient(places[index], moves[index])
         else:
-            pelvis = int(body.parents[index[0]])
+            pelvis = max(int(body.parents[index[0]]), 0)  # a leg alone hangs on nothing
             turn = np.hstack([np.eye(3), np.zeros((3, 3)), np.where(below[:, pelvis], screws[:, :3].T, 0.0)])
             seen_from = sagittal @ joints[pelvis, :3, :3].T  # the pelvis' forward and up, in the world
             yield _flexion(places[index], moves[index], seen_from, turn)

@@ -20,6 +20,7 @@ KEPT_JOINTS = {
     "legs": ("pelvis", "spine", "hip", "knee", "ankle", "toe"),  # up to the waist: they may wear something
     "arms": ("pelvis", "spine", "chest", "neck", "head", "clavicle", "shoulder", "elbow", "wrist"),
 }
+KNOWN, TRUNK = set().union(*KEPT_JOINTS.values()), ("pelvis", "spine", "chest")
 
 
 class Cut(NamedTuple):
@@ -71,12 +72,13 @@ def assemble(
 def cut_out(faces: I32, skeleton: Skeleton, weights: F64, kept: tuple[str, ...]) -> Cut:
     """Return the part of a body that the joints named in `kept` move, and which vertices lie on the new rim.
 
-    A vertex stays if most of its weight does; what weight it loses goes to the nearest kept joint above.
+    A joint of another name, such as a finger's, stays with the limb that it hangs on. A vertex stays if most of its
+    weight does; what weight it loses goes to the nearest kept joint above.
 
     Raises:
         RecordingError: a kept joint hangs below one that goes, or nothing is left.
     """
-    stays = np.array([unsided(name) in kept for name in skeleton.names])
+    stays = _staying(skeleton, kept)
     inside = weights[:, stays].sum(axis=1) > 0.5 * weights.sum(axis=1)
     whole = inside[faces].all(axis=1)
     lost = [j for j in np.flatnonzero(stays & (skeleton.parents >= 0)) if not stays[skeleton.parents[j]]]
@@ -101,6 +103,14 @@ def cut_out(faces: I32, skeleton: Skeleton, weights: F64, kept: tuple[str, ...])
     )
     moved = _handed_up(weights, skeleton, stays)[used][:, joints]
     return Cut(used.astype(np.int32), number[faces[whole]].astype(np.int32), part, moved, rim[used])
+
+
+def _staying(skeleton: Skeleton, kept: tuple[str, ...]) -> Bool:
+    stays = np.zeros(len(skeleton.names), bool)
+    for joint, (name, above) in enumerate(zip(map(unsided, skeleton.names), skeleton.parents, strict=True)):
+        on_limb = above > 0 and stays[above] and unsided(skeleton.names[above]) not in TRUNK
+        stays[joint] = name in kept or (name not in KNOWN and (above < 0 or on_limb))  # a root of any name
+    return stays
 
 
 def _boundary(faces: I32) -> I32:

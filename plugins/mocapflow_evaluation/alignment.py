@@ -18,6 +18,7 @@ HALF = 0.5  # frames; a smaller lag is lost in the resampling, and times that di
 LIKE = 0.5  # correlation below which two systems show no common lag
 GAIN = 0.2  # of what is unlike without a lag; a lag that explains less may be chance
 TURNED = -0.8  # correlation; what is less opposed may be chance
+ROUND, TURN = "hip_flexion", 360.0  # the angle that goes all the way round: 190 degrees are -170
 FLIP = 0.1  # by how much the correlation must gain for a curve to be taken as counted the other way
 
 
@@ -50,7 +51,19 @@ def resampled(at: F64, values: F64, wanted: F64, step: float) -> F64:
 def at_our_frames(reference: Reference, columns: Mapping[str, F64], lag: float = 0.0) -> dict[str, F64]:
     """Return the curves (T,) of a reference at our frames, or a lag in frames before; NaN where it has nothing."""
     at, ours = clocks(reference, columns, lag)
-    return {name: resampled(at, curve, ours, reference.step) for name, curve in reference.curves.items()}
+    return {name: resampled(at, unwrapped(curve), ours, reference.step) for name, curve in reference.curves.items()}
+
+
+def unwrapped(curve: F64) -> F64:
+    """Return a curve (T,) deg that goes on past half a turn: nothing lies between 179 and -179."""
+    smooth, known = curve.copy(), np.isfinite(curve)
+    smooth[known] = np.unwrap(curve[known], period=TURN)
+    return smooth
+
+
+def beside(ours: F64, curve: F64, name: str) -> F64:
+    """Return a curve (T,) deg of an angle by name at the turn that is nearest to ours: 190 beside -175 is -170."""
+    return curve - TURN * np.round((curve - ours) / TURN) if name.startswith(ROUND) else curve
 
 
 def clocks(reference: Reference, columns: Mapping[str, F64], lag: float) -> tuple[F64, F64]:
@@ -70,10 +83,10 @@ def align(columns: Mapping[str, F64], reference: Reference, longest_lag_s: float
     step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
     reach = max(1, round(longest_lag_s / step))
     shifts = np.arange(-reach, reach + 1)
-    names = [name for name in columns if name in reference.curves]
+    own = {name: unwrapped(curve) for name, curve in columns.items() if name in reference.curves}
     shifted = [at_our_frames(reference, columns, float(shift)) for shift in shifts]
-    table = np.array([[_products(columns[name], each[name]) for name in names] for each in shifted])
-    table = table.reshape(len(shifts), len(names), 3)
+    table = np.array([[_products(curve, each[name]) for name, curve in own.items()] for each in shifted])
+    table = table.reshape(len(shifts), len(own), 3)
     together, ours, theirs = np.moveaxis(table, 2, 0)
     most = np.sqrt(ours * theirs)
     flipped = together < TURNED * most
@@ -82,8 +95,8 @@ def align(columns: Mapping[str, F64], reference: Reference, longest_lag_s: float
     score = np.where(size > 0, total / np.sqrt(np.where(size > 0, size, 1.0)), -np.inf)
     best = int(np.argmax(score))
     if score[best] < LIKE:
-        return Alignment(np.nan, dict.fromkeys(names, 1))
-    signs = {name: -1 if each else 1 for name, each in zip(names, flipped[best], strict=True)}
+        return Alignment(np.nan, dict.fromkeys(own, 1))
+    signs = {name: -1 if each else 1 for name, each in zip(own, flipped[best], strict=True)}
     unlike = 1 - score[reach]  # without a lag; infinite where too few frames have both then
     gain = float((score[best] - score[reach]) / unlike) if 0 < unlike < np.inf else float(unlike > 0)
     return Alignment(turning_point(shifts, score, best), signs, gain)

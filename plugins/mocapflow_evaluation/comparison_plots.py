@@ -20,8 +20,8 @@ MOMENTS = 6  # in which the stick models are drawn
 
 def draw(ours: Mapping[str, F64], reference: Mapping[str, F64], strides: Sequence[Cycle], folder: Path) -> list[Path]:
     """Draw agreement with each curve of the reference, and strides where there are some; return the files."""
-    both = {name: _common_strides(strides, ours[name], curve, name) for name, curve in reference.items()}
-    walked = {name: pair for name, pair in both.items() if len(pair["mocapflow"])}
+    both = {name: cycles.common(strides, ours[name], curve, name) for name, curve in reference.items()}
+    walked = {name: {"reference": pair[:, 1], "mocapflow": pair[:, 0]} for name, pair in both.items() if len(pair)}
     agreement, cycle = (layout.place(folder, part) for part in (layout.AGREEMENT_PLOT, layout.CYCLES_PLOT))
     drawn = [draw_agreement(agreement, {name: (ours[name], curve) for name, curve in reference.items()})]
     return [*drawn, draw_cycles(cycle, walked)] if walked else drawn
@@ -95,10 +95,3 @@ def _across(stick: Stick, row: int) -> F64:
     at = dict(zip(stick.names, stick.places[row], strict=True))
     left: F64 = at.get("hip_l", np.full(3, np.nan)) - at.get("hip_r", np.full(3, np.nan))
     return left * [1.0, 1.0, 0.0] / np.linalg.norm(left[:2]) if np.isfinite(left).all() else np.array([1.0, 0.0, 0.0])
-
-
-def _common_strides(strides: Sequence[Cycle], ours: F64, reference: F64, name: str) -> dict[str, F64]:
-    """Return the strides (G, 101) that both systems have."""
-    a, b = cycles.normalised(strides, ours, name), cycles.normalised(strides, reference, name)
-    both = np.isfinite(a + b).all(axis=1)
-    return {"reference": b[both], "mocapflow": a[both]}

@@ -97,9 +97,15 @@ def normalised(cycles: Sequence[Cycle], values: F64, name: str) -> F64:
 
 def across(cycles: Sequence[Cycle], ours: F64, reference: F64, name: str) -> float:
     """Return the coefficient of multiple correlation over all strides that both have, NaN where there is none."""
-    both = np.stack([normalised(cycles, values, name) for values in (ours, reference)], axis=1)
-    both = both[np.isfinite(both).all(axis=(1, 2))]
+    both = common(cycles, ours, reference, name)
     return compare.cmc(both) if len(both) else np.nan
+
+
+def common(cycles: Sequence[Cycle], ours: F64, reference: F64, name: str) -> F64:
+    """Return two curves (T,) stride by stride, see `normalised`, of the strides that both have: (G, 2, 101)."""
+    both = np.stack([normalised(cycles, values, name) for values in (ours, reference)], axis=1)
+    known: F64 = both[np.isfinite(both).all(axis=(1, 2))]
+    return known
 
 
 def own(cycles: Sequence[Cycle], name: str) -> list[Cycle]:

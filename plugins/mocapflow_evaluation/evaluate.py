@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
 
@@ -16,7 +17,7 @@ from mocapflow.records import F64
 from mocapflow.results import Evaluation, RunFolder, Track, ViewChecks
 from mocapflow.scene import Scene
 from mocapflow_evaluation import compare, comparison_plots, cycles, findings, tracked_motion
-from mocapflow_evaluation.alignment import align, at_our_frames
+from mocapflow_evaluation.alignment import align, at_our_frames, beside, unwrapped
 from mocapflow_evaluation.cycles import Cycle
 from mocapflow_evaluation.keypoint_reference import low_pass, with_keypoints, write_triangulated
 from mocapflow_evaluation.measured_points import SUFFIXES as POINTS
@@ -108,7 +109,10 @@ def evaluate_run(run_folder: Path, truth: Path, longest_lag_s: float = LONGEST_L
 def evaluate(own: TrackedMotion, path: Path, folder: Path, longest_lag_s: float = LONGEST_LAG_S) -> Evaluation:
     """Compare with a reference file; writes tables, what was found of both systems, and pictures into a run folder."""
     reference = read_reference(path)
-    known = cycles.shared(own.columns, at_our_frames(reference, own.columns))
+    if path.resolve() == (folder / layout.KEYPOINTS).resolve():  # triangulated with the cameras of the run
+        reference = replace(reference, in_our_world=True)
+    shared = cycles.shared(own.columns, at_our_frames(reference, own.columns))
+    known = {name: beside(own.columns[name], curve, name) for name, curve in shared.items()}
     alignment = align(own.columns, reference, longest_lag_s)
     aligned = at_our_frames(reference, own.columns, alignment.worth)
     strides = cycles.gait_cycles(own.stick.names, own.stick.places, own.frame_rate)
@@ -145,15 +149,17 @@ def _write_tables(
 
 def _row(own: TrackedMotion, name: str, known: F64, aligned: F64, strides: Sequence[Cycle]) -> dict[str, float | str]:
     """Return the figures of one angle against its reference as it is, and as aligned with us."""
-    curve, frame = own.columns[name], own.columns["frame"]
+    curve, frame = unwrapped(own.columns[name]), own.columns["frame"]
     unknown = np.full(len(curve), np.nan)
-    sd, raw = own.columns.get(f"{name}_sd", unknown), own.raw.get(name, unknown)
-    error = (curve - aligned)[np.isfinite(curve - aligned)]
+    sd, raw = own.columns.get(f"{name}_sd", unknown), unwrapped(own.raw.get(name, unknown))
+    known, filtered = beside(curve, known, name), low_pass(raw, own.frame_rate, filtered_alone=True)
+    error = curve - beside(curve, aligned, name)
+    error = error[np.isfinite(error)]
     return {
         "angle": name,
         **compare.figures(curve, known, sd, frame, own.frame_rate),
-        "rms_unsmoothed_deg": compare.rms(raw - known),
-        "rms_lowpassed_deg": compare.rms(low_pass(raw, own.frame_rate, filtered_alone=True) - known),
+        "rms_unsmoothed_deg": compare.rms(beside(known, raw, name) - known),
+        "rms_lowpassed_deg": compare.rms(beside(known, filtered, name) - known),
         "rms_aligned_deg": compare.rms(error - np.mean(error)) if len(error) else np.nan,
         "cycles": len(cycles.own(strides, name)),
         "cmc_cycles": cycles.across(strides, curve, known, name),

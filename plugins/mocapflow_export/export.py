@@ -27,7 +27,7 @@ class WriteFormats(Stage):
     """Writes the track in further formats, and nothing else: what `mocapflow export` does with a finished run."""
 
     name: ClassVar[str] = "write_formats"
-    formats: tuple[Format, ...] = ("csv", "mot", "trc")  # those beyond these three need their extra
+    formats: tuple[Format, ...] = ("csv", "mot", "trc")  # those beyond these three, but for bvh, need their extra
 
     def need(self, recording: Recording) -> None:
         """Raise if a package that a format is written with is not installed."""
@@ -70,7 +70,7 @@ class Export(WriteFormats):
         for warning in quality:
             LOG.warning(warning)
         warnings = (*result.recording.warnings, *scene.warnings, *quality)
-        content = runjson.summary(track, scene.body, measured(track, scene), run_folder, warnings)
+        content = runjson.summary(track, scene.body, result.angles, run_folder, warnings)
         return [*paths, runjson.write(layout.place(run_folder.path, layout.RUN), content)]
 
 
@@ -82,10 +82,10 @@ def written(name: str, result: Result, folder: Path) -> list[Path]:
 
 def write_angles(result: Result, folder: Path) -> list[Path]:
     """Write angles.csv, angles_raw.csv and energy.csv into a run folder."""
-    track, scene = result.track, result.scene
+    track = result.track
     columns = {
-        layout.ANGLES: tables.angle_columns(track, measured(track, scene)),
-        layout.RAW_ANGLES: tables.angle_columns(track, measured(track.before_smoothing, scene)),
+        layout.ANGLES: tables.angle_columns(track, result.angles),
+        layout.RAW_ANGLES: tables.angle_columns(track, measured(track.before_smoothing, result.scene)),
         layout.ENERGY: tables.energy_columns(track),
     }
     return [tables.write_columns(layout.place(folder, part), each) for part, each in columns.items()]

@@ -83,7 +83,7 @@ class CalibrateLimbs(Stage):
             RecordingError: neither a track nor keypoints say where the person is.
         """
         scene = (scene if self.draper else scene.undressed).with_background(background)
-        clothes, poses = self._from_track(track) if track else self._from_keypoints(recording, scene)
+        clothes, poses = self._from_track(track) if track else self._from_keypoints(recording, scene, checks)
         body = scene.body
         modes = modes_of(body) if self.shape else ()
         if self.shape and not modes:
@@ -115,9 +115,11 @@ class CalibrateLimbs(Stage):
         rows = spaced_evenly(np.flatnonzero(good).tolist() or range(len(track.frame)), self.frames)
         return {int(track.frame[r]): track.cloth_parameters[r].copy() for r in rows}, [track.pose(r) for r in rows]
 
-    def _from_keypoints(self, recording: Recording, scene: Scene) -> tuple[dict[int, F64], list[Pose]]:
+    def _from_keypoints(
+        self, recording: Recording, scene: Scene, checks: ViewChecks | None
+    ) -> tuple[dict[int, F64], list[Pose]]:
         indices, names = spaced_evenly(recording.indices, self.frames), landmarks(scene.body).names
-        found = frames_seen(recording, indices, scene.cameras, names)
+        found = frames_seen(recording, indices, scene.cameras, names, checks=checks)
         _, poses = fit(scene.body, list(found.values()), scene.cameras)
         return dict.fromkeys(found, scene.neutral_parameters), list(poses)
 

@@ -101,13 +101,14 @@ def frames_seen(
     cameras: Sequence[Camera],
     landmarks: Sequence[str],
     wanted: Layout | None = None,
+    checks: ViewChecks | None = None,
 ) -> dict[int, Seen]:
-    """Return the person's landmarks in each frame that tells a pose.
+    """Return the person's landmarks in each frame that tells a pose, by keypoints as checks pass them.
 
     Raises:
         RecordingError: there are no keypoints, or they tell no pose in any frame; see `persons` and `names_of`.
     """
-    found = persons(recording, indices, cameras)
+    found = persons(recording, indices, cameras, checks)
     names = names_of(recording, list(found), wanted)
     frames = {index: seen(person, names, landmarks) for index, person in found.items()}
     telling = {index: frame for index, frame in frames.items() if tells_pose(frame)}

@@ -79,7 +79,7 @@ def _foot(body: Body, directions: F64, side: str) -> Mapping[str, tuple[int, F64
     """Return heel and toes: the ends of the sole along the foot."""
     forward, left, up = directions
     own = [body.joint(n) for n in (f"ankle_{side}", f"toe_{side}") if n in body.joint_names]
-    skin = body.vertices[np.isin(body.skin_joint[:, 0], own)]
+    skin = body.vertices[np.isin(body.main_joint, own)]
     if not own or len(skin) < 10:
         return {}
     foot = skin[skin @ up < body.positions[own[0]] @ up]
@@ -89,7 +89,7 @@ def _foot(body: Body, directions: F64, side: str) -> Mapping[str, tuple[int, F64
     middle = np.median(front @ outward)
     inner, outer = front[front @ outward < middle], front[front @ outward >= middle]
     tip, small = inner[np.argmax(inner @ forward)], outer[np.argmax(outer @ (forward + outward))]
-    heel = foot[along < np.quantile(along, 0.03)].mean(axis=0)
+    heel = foot[along <= np.quantile(along, 0.03)].mean(axis=0)
     length = np.ptp(along) * forward
     tip, small, heel = tip - TOE_INSIDE * length, small - TOE_INSIDE * length, heel + HEEL_INSIDE * length
     return {f"big_toe_{side}": (own[-1], tip), f"small_toe_{side}": (own[-1], small), f"heel_{side}": (own[0], heel)}
@@ -101,7 +101,7 @@ def _head(body: Body, directions: F64) -> Mapping[str, tuple[int, F64]]:
     if "head" not in body.joint_names:
         return {}
     joint = body.joint("head")
-    skin = body.vertices[body.skin_joint[:, 0] == joint]
+    skin = body.vertices[body.main_joint == joint]
     skin = skin[skin @ up > body.positions[joint] @ up] if len(skin) else skin
     if len(skin) < 10:
         return {}

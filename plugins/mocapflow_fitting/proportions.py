@@ -115,6 +115,6 @@ def _stretches(body: Body, factors: Mapping[str, float]) -> F64:
             stretch[joint] = by[WHOLE[base]] * np.eye(3)
         else:
             hips, shoulders = by["hip_width"], by["shoulder_width"]
-            width = {"pelvis": hips, "chest": shoulders}.get(base, (hips + shoulders) / 2)
+            width = {"pelvis": hips, "chest": shoulders, "clavicle": shoulders}.get(base, (hips + shoulders) / 2)
             stretch[joint] = directions.T @ np.diag([by["girth"], width, by["trunk"]]) @ directions
     return by["stature"] * stretch

@@ -153,7 +153,8 @@ def from_columns(degrees: Mapping[str, F64], body: Body) -> Angles:
     for name, screw in screws.items():
         curve = np.degrees(np.unwrap(np.radians(shown.value[:, shown.names.index(name)])))  # a thigh passes straight up
         bent = slice(int(curve.argmin()), int(curve.argmax()) + 1)  # a limb bent backwards shows the same
-        found[screw] = np.interp(degrees[name], curve[bent], BENDS[bent])
+        round_again = degrees[name] < curve[bent].mean() - 180  # -179 is 181, past straight up
+        found[screw] = np.interp(degrees[name] + 360 * round_again, curve[bent], BENDS[bent])
     return found
 
 

@@ -71,7 +71,7 @@ class Report(Stage):
             ("Versions", page.listing([f"{name} {version}" for name, version in recipe.get("versions", {}).items()])),
             ("Settings and recipe", page.code(json.dumps(recipe, indent=1, ensure_ascii=False))),
         ]
-        counts = f"{len(track.frame)} frames, {len(scene.cameras)} cameras, {recording.frame_rate:g} per second"
+        counts = f"{len(track.frame)} frames, {len(scene.cameras)} cameras, {recording.run_rate:g} per second"
         subtitle = f"{recording.folder.name}: {counts}"
         path = layout.place(run_folder.path, layout.REPORT)
         with atomic_write(path) as part:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mocapflow.assets import Camera
-from mocapflow.data import Surface
+from mocapflow.data import PoseBatch, Surface
 from mocapflow.geometry import angles, cameras, kinematics
 from mocapflow.records import F32, F64, U8
 from mocapflow.scene import Scene
@@ -30,17 +30,17 @@ class Room:
 
     Args:
         scene: the person and the cameras.
-        root: (T, 4, 4) m, world_from_body over the motion: all of it is in the picture.
+        poses: of the motion, T of them: all of it is in the picture.
         size: of a picture, width and height in px.
     """
 
-    def __init__(self, scene: Scene, root: F64, size: tuple[int, int]) -> None:
-        self._scene = scene
-        roots = kinematics.root_position(scene.body, root)
-        lowest = scene.body.vertices[:, 2].min() - scene.body.positions[0, 2]
-        height = float(np.median(roots[:, 2]) + lowest)
+    def __init__(self, scene: Scene, poses: PoseBatch, size: tuple[int, int]) -> None:
+        self._scene, body = scene, scene.body
+        places = kinematics.joint_centres(body, poses.root, poses.angles)
+        skin = body.positions[:, 2].min() - body.vertices[:, 2].min()  # below the lowest joint, whichever that is
+        height = float(np.median(places[..., 2].min(axis=1)) - skin)
         self._floor = 0.0 if abs(height) < 0.2 else height  # the world's floor, unless the person stands elsewhere
-        self._camera = self._place(roots, root[0, :3, :3], (SMOOTH * size[0], SMOOTH * size[1]))
+        self._camera = self._place(places[:, 0], poses.root[0, :3, :3], (SMOOTH * size[0], SMOOTH * size[1]))
         self._side = BESIDE * self._camera.camera_from_world[0, :3]
         self._empty = self._backdrop()
 

@@ -8,7 +8,7 @@ from mocapflow_export import layout
 from pydantic import Field, PositiveInt
 
 from mocapflow.components import Stage
-from mocapflow.data import NO_CLOTH
+from mocapflow.data import NO_CLOTH, PoseBatch
 from mocapflow.results import Files, RunFolder, Track
 from mocapflow.scene import Scene
 from mocapflow_report import drawing
@@ -30,7 +30,8 @@ class Virtual(Stage):
     def run(self, track: Track, scene: Scene, run_folder: RunFolder) -> Files:
         """Write the video and return its path."""
         path = layout.place(run_folder.path, layout.VIRTUAL)
-        room = Room(scene, track.root, (self.width_px, self.height_px))
+        poses = PoseBatch(root=track.root, angles=track.angles)
+        room = Room(scene, poses, (self.width_px, self.height_px))
         with drawing.videos([path], track.frame_rate / self.every, self.codec) as (video,):
             rows = range(0, len(track.frame), self.every)
             for done, row in enumerate(rows, 1):

@@ -64,6 +64,9 @@ def test_what_is_not_measured_is_said() -> None:
     assert Scene(cameras=(), body=legs).warnings == (f"body: {angles.unmeasured(legs.joint_names)}",)
     cut = np.ones(len(legs.cut), bool)  # as `part: legs` leaves it
     assert Scene(cameras=(), body=replace(legs, cut=cut)).warnings == ()
+    named = tuple(name.replace("toe", "ball") for name in legs.joint_names)
+    said = "body: no angles ankle_l, ankle_r: the skeleton has no joints named toe_l, toe_r"
+    assert Scene(cameras=(), body=replace(legs, cut=cut, joint_names=named)).warnings == (said,)
 
 
 @pytest.mark.parametrize("clip", ["skirt_steps", "shorts_steps"])
@@ -168,6 +171,25 @@ def test_nothing_is_known_of_an_angle_that_no_screw_changes() -> None:
     )
     assert np.isnan([series.sd[0, 0], series.observed[0, 0]]).all()
     assert np.isfinite(series.sd[0, 1:]).all()
+
+
+def test_a_leg_alone_hangs_on_nothing() -> None:
+    """No joint says where the hip is flexed from: what the toes do is none of it."""
+    body = stick_body(keep=("pelvis", "hip", "knee", "ankle", "toe"))
+    leg = [body.joint(f"{name}_r") for name in ("hip", "knee", "ankle", "toe")]
+    rows = np.isin(body.screw_joint, leg[1:])
+    alone = replace(
+        body, joint_names=tuple(body.joint_names[k] for k in leg), parents=np.arange(-1, 3, dtype=np.int32),
+        positions=body.positions[leg], twists=body.twists[rows], screw_joint=np.repeat([1, 2, 3], 3).astype(np.int32),
+        screw_names=tuple(np.array(body.screw_names)[rows]), limits=body.limits[rows],
+        rest_spread=body.rest_spread[rows],
+    )  # fmt: skip
+    poses = np.zeros((2, 9))
+    poses[1, 6:] = 0.5  # of the toes
+    found = angles.measure(alone, np.tile(np.eye(4), (2, 1, 1)), poses, np.tile(np.eye(15), (2, 1, 1)))
+    hip = found.names.index("hip_flexion_r")
+    assert found.value[0, hip] == found.value[1, hip]
+    assert np.isnan(found.sd[:, hip]).all()
 
 
 def test_left_is_level_whatever_the_hips_are() -> None:

@@ -77,6 +77,23 @@ def test_parts_move_as_the_whole_does(body, part, joints, screw_count):
         assert 20 < len(rim) < 200 and (np.abs(rim[:, 2] - height) < 0.15).all()
 
 
+@pytest.mark.parametrize(("part", "names"), [
+    ("legs", {"toe": "ball", "pelvis": "root"}), ("arms", {"wrist": "hand", "head": "skull", "pelvis": "root"}),
+    ("legs", {"chest": "spine2"}),
+])  # fmt: skip
+def test_a_part_keeps_what_hangs_on_its_limbs_whatever_it_is_called(recording, part, names):
+    whole = Scanned(part=part).load(recording)
+    files = [recording / "subject" / name for name in ("skeleton.json", "weights.npz")]
+    with np.load(files[1]) as given:
+        weights, listed = given["weights"], given["names"]
+    text = files[0].read_text()
+    for old, new in names.items():
+        text, listed = text.replace(f'"{old}', f'"{new}'), np.char.replace(listed, old, new)
+    files[0].write_text(text)
+    np.savez(files[1], weights=weights, names=listed)
+    np.testing.assert_array_equal(Scanned(part=part).load(recording).vertices, whole.vertices)
+
+
 def test_flexion_bends_the_way_people_do(body):
     forward, outward = np.array([0, -1.0, 0]), {"l": 1.0, "r": -1.0}
     for side in "lr":

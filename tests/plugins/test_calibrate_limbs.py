@@ -167,6 +167,16 @@ def test_views_that_were_found_wrong_do_not_count(body, poses):
     np.testing.assert_array_equal(seen, [[True] * 4, [True, True, False, True]])
 
 
+def test_keypoints_of_views_that_were_found_wrong_tell_no_pose(body, poses, tmp_path):
+    folder = copy_demo(tmp_path / "recording")
+    write(folder, body, poses[:2], open_recording(folder).cameras)
+    recording = open_recording(folder, stop=2)
+    scene = Scene(cameras=recording.cameras, body=body)
+    stage = CalibrateLimbs(segmenter=masks_of(body, poses), matchers=(ContourIcp(),))
+    wrong = ViewChecks(frame=np.int32([0, 0, 0]), camera=np.int16([0, 1, 2]), reasons=("of another time",) * 3)
+    assert [list(stage._from_keypoints(recording, scene, checks)[0]) for checks in (None, wrong)] == [[0, 1], [1]]
+
+
 def test_the_fitted_body_stands_on_the_floor(body, poses, monkeypatch):
     def longer(body, matchers, solution, *_):
         return solution._replace(shared=np.full_like(solution.shared, 0.05))

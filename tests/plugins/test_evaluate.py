@@ -201,6 +201,28 @@ def test_our_unsmoothed_curve_is_filtered_as_references_are(tmp_path: Path) -> N
         assert got["rms_unsmoothed_deg"] == pytest.approx(compare.rms(ours - truth), abs=1e-3)
 
 
+@pytest.mark.usefixtures("undrawn")
+@pytest.mark.parametrize("clock", ["frame", "time"])
+def test_a_thigh_that_passes_straight_up_errs_by_the_way_between_and_not_by_a_turn(tmp_path: Path, clock: str) -> None:
+    """Raised aside above the level, or in a split: 3 degrees past 179 are -178."""
+    frame = np.arange(60.0)
+    at = frame if clock == "frame" else np.arange(0, 60, 0.75)
+    hip, theirs = (180 + 25 * np.sin(2 * np.pi * each / 40) for each in (frame, at))
+    ours = {"frame": frame, "time": frame / 30, "hip_flexion_l": (hip + 3) % 360, "knee_flexion_l": 0.5 * hip}
+    ours["hip_flexion_l"][ours["hip_flexion_l"] > 180] -= 360
+    curves = {"hip_flexion_l": theirs - 360 * (theirs > 180), "knee_flexion_l": -0.5 * theirs}
+    tables.write_columns(tmp_path / "t.csv", {clock: at if clock == "frame" else at / 30, **curves})
+    evaluation = evaluate(columns_only(ours), tmp_path / "t.csv", tmp_path)
+    got = {str(row["angle"]): row for row in evaluation.rows}
+    for name in ("rms_deg", "rms_unsmoothed_deg", "max_deg", "mae_deg"):
+        assert got["hip_flexion_l"][name] == pytest.approx(3, abs=0.3), name
+    assert got["hip_flexion_l"]["rms_lowpassed_deg"] == pytest.approx(3, abs=1)
+    assert got["hip_flexion_l"]["rms_aligned_deg"] == pytest.approx(0, abs=0.2)
+    assert got["knee_flexion_l"]["max_deg"] == pytest.approx(205, abs=0.5)  # counted the other way: no turn between
+    errors = read_columns(tmp_path / layout.ERRORS)["hip_flexion_l"]
+    assert np.nanmax(np.abs(errors - 3)) < 0.5
+
+
 @pytest.mark.usefixtures("unrendered")
 def test_the_share_of_frames_in_doubt_is_told_by_a_track_and_by_its_files(tmp_path: Path) -> None:
     scene = demo_scene()

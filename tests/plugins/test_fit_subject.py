@@ -2,6 +2,7 @@
 
 import logging
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -98,6 +99,14 @@ def test_a_proportion_stretches_its_own_bones(body, name, ends):
     ]
     area = np.linalg.norm(normals[0], axis=1)
     assert (np.sum(normals[0] * normals[1], axis=1) > 0)[area > 1e-7].mean() > 0.999  # no face turns over
+
+
+def test_clavicles_are_of_the_shoulders(body):
+    named = {"spine": "chest", "chest": "clavicle"}
+    other = replace(body, joint_names=tuple(named.get(name, name) for name in body.joint_names))
+    for name, wider in (("shoulder_width", 1.1), ("hip_width", 1.0)):
+        apart = [length(each, "shoulder_l", "shoulder_r") for each in (scaled(other, {name: 1.1}), other)]
+        assert apart[0] / apart[1] == pytest.approx(wider, rel=1e-9)
 
 
 def test_girth_leaves_the_bones(body):

@@ -208,6 +208,15 @@ def test_gltf_opens_and_moves_body_and_garment(result: Result, tmp_path: Path) -
         assert off.max() < 2e-3  # the format has four joints a vertex, ours five
 
 
+def test_gltf_keeps_the_strongest_joints_of_each_vertex(result: Result, tmp_path: Path) -> None:
+    """Whatever order a body lists them in: the weakest first here."""
+    body = result.scene.body
+    turned = {name: np.ascontiguousarray(getattr(body, name)[:, ::-1]) for name in ("skin_joint", "skin_weight")}
+    other = replace(result, scene=replace(result.scene, body=replace(body, **turned)))
+    shown = [readers.Gltf(write("gltf", each, tmp_path)).skinned(3) for each in (result, other)]
+    np.testing.assert_allclose(shown[1], shown[0], atol=NEAR)
+
+
 @pytest.mark.parametrize("name", ["body", "garment"])
 def test_gltf_is_lit_from_outside(result: Result, tmp_path: Path, name: str) -> None:
     """Another library weighs the faces about a vertex by their angles there."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from keypoint_recording import DEMO, copy_demo, write
 from mocapflow_bodies.template import Template
 from mocapflow_evaluation.evaluate import Evaluate
 from mocapflow_evaluation.keypoint_reference import low_pass
+from mocapflow_export import layout
 from mocapflow_fitting.align_cameras import turn
 from mocapflow_fitting.landmarks import landmarks
 from results_scene import make_track, stepping
@@ -80,6 +82,20 @@ def test_right_cameras_give_the_very_points(track: Track, recording: Recording, 
     for side in "lr":  # its hips are marked outside their centres, which is an offset
         assert rows[f"knee_flexion_{side}"]["frames"] == FRAMES
         assert rows[f"knee_flexion_{side}"]["rms_without_offset_deg"] < 1.0
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("undrawn")
+def test_joint_centres_are_compared_where_they_are(track: Track, recording: Recording, tmp_path: Path) -> None:
+    """Both are in the world of the cameras: a person who was tracked 5 cm aside is not moved back."""
+    aside = track.root.copy()
+    aside[:, 0, 3] += 0.05
+    evaluation = evaluated(make_track(aside, track.angles), recording, seen_by(recording), tmp_path)
+    with (tmp_path / layout.DISTANCES).open(newline="") as file:
+        rows = {row["joint"]: row for row in csv.DictReader(file)}
+    for joint in ("neck", "knee_l", "wrist_r"):  # are marked at their centres
+        assert float(rows[joint]["mean_mm"]) == pytest.approx(50, abs=0.1)
+    assert not any("registered" in note for note in evaluation.notes)
 
 
 @pytest.mark.long

@@ -99,6 +99,30 @@ def test_arms_that_hang_straight_are_at_zero(upright: Body) -> None:
     assert turned(body, shoulder_r_x=-20)["arm_flex_r"] == pytest.approx(20)
 
 
+def test_what_turns_a_clavicle_turns_the_arm_against_the_chest(upright: Body) -> None:
+    """OpenSim's models have none: its joint between chest and shoulder would be lost."""
+    named = {"spine": "chest", "chest": "clavicle"}
+    split = (name.partition(".") for name in upright.screw_names)
+    screws = tuple(f"{named.get(joint, joint)}.{axis}" for joint, _, axis in split)
+    body = replace(upright, joint_names=tuple(named.get(n, n) for n in upright.joint_names), screw_names=screws)
+    rest, found = turned(body), turned(body, clavicle_y=20.0)
+    assert {n: found[n] - rest[n] for n in ("arm_add_r", "arm_add_l", "lumbar_bending")} == pytest.approx(
+        {"arm_add_r": -20, "arm_add_l": 20, "lumbar_bending": 0}
+    )
+
+
+def test_an_arm_alone_hangs_on_nothing(upright: Body) -> None:
+    arm = [upright.joint(name) for name in ("shoulder_r", "elbow_r", "wrist_r")]
+    rows = np.isin(upright.screw_joint, arm[1:])
+    body = replace(
+        upright, joint_names=("shoulder_r", "elbow_r", "wrist_r"), parents=np.arange(-1, 2, dtype=np.int32),
+        positions=upright.positions[arm], twists=upright.twists[rows], limits=upright.limits[rows],
+        screw_names=tuple(np.array(upright.screw_names)[rows]), screw_joint=np.repeat([1, 2], 3).astype(np.int32),
+        rest_spread=upright.rest_spread[rows], skin_joint=np.zeros_like(upright.skin_joint),
+    )  # fmt: skip
+    assert turned(body, wrist_r_y=20.0) == pytest.approx(turned(body))
+
+
 def test_hip_flexion_of_a_lifted_knee_is_positive(upright: Body) -> None:
     assert turned(upright, hip_r_x=-60)["hip_flexion_r"] == pytest.approx(60)
     assert turned(upright, elbow_r_x=-30)["elbow_flex_r"] == pytest.approx(30 + np.degrees(np.arctan2(0.1, 0.2)))

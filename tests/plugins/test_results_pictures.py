@@ -11,13 +11,15 @@ from mocapflow_export import layout, tables
 from mocapflow_report import drawing, portrait, raster, report_rows
 from mocapflow_report.overlay import Overlay, Painter
 from mocapflow_report.report import Report
+from mocapflow_report.room import Room
 from mocapflow_report.stills import chosen_rows, stills
 from mocapflow_report.virtual import Virtual
 from mocapflow_sequence.smooth import Smooth
 from results_scene import DEMO, demo_scene, stepping
 
+from mocapflow.data import NO_CLOTH, Pose, PoseBatch
 from mocapflow.errors import StoreError
-from mocapflow.geometry import cameras
+from mocapflow.geometry import cameras, kinematics
 from mocapflow.io.motion.csv_columns import read_columns
 from mocapflow.knocks import Knocks
 from mocapflow.recordings.recording import Recording, open_recording
@@ -127,6 +129,21 @@ def test_virtual_room_moves_with_the_person(scene: Scene, track: Track, tmp_path
     assert len(read_back(every)) == 2
 
 
+@pytest.mark.parametrize("above", [0.0, 1.0])
+def test_the_floor_is_below_whoever_crouches(scene: Scene, above: float) -> None:
+    """Feet stay on it; the pelvis sinks by a third of a metre and more."""
+    names, poses = scene.body.screw_names, stepping(scene.body, 3)
+    root, angles = poses.root.copy(), poses.angles.copy()
+    for side in "lr":
+        angles[:, names.index(f"hip_{side}.x")] -= 1.2
+        angles[:, names.index(f"knee_{side}.x")] += 2.2
+        angles[:, names.index(f"ankle_{side}.x")] -= 1.0
+    first = Pose(root=root[0].copy(), angles=angles[0].copy())
+    root[:, 2, 3] += above - scene.undressed.surface(first, NO_CLOTH).vertices[:, 2].min()
+    assert kinematics.root_position(scene.body, root)[0, 2] < above + 0.7
+    assert abs(Room(scene, PoseBatch(root=root, angles=angles), (64, 64))._floor - above) < 0.1
+
+
 def test_rasteriser_draws_where_the_camera_projects() -> None:
     view = raster.look_at(np.array([3.0, -2.0, 1.5]), np.array([0.0, 0.0, 1.0]), (320, 240), 40.0)
     canvas = raster.Canvas(np.zeros((240, 320, 3), np.float32), view)
@@ -223,6 +240,20 @@ def test_report_fetches_nothing(page: str) -> None:
     assert all(link.startswith("data:image/") for link in links.fetched)
     style = page[page.index("<style>") : page.index("</style>")]
     assert "url(" not in style and "@import" not in style
+
+
+def test_report_counts_the_frames_of_the_run_and_their_rate(
+    scene: Scene, track: Track, recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every third of 30 pictures a second."""
+    pictures = [layout.place(tmp_path, part) for part in (layout.PLOT, layout.OVERLAP)]
+    for picture in pictures:
+        picture.touch()
+    monkeypatch.setattr("mocapflow_report.report.draw", lambda *_: pictures)
+    monkeypatch.setattr("mocapflow_report.report.stills", lambda *_: [])
+    sparse = replace(recording, indices=range(0, 12, 3))
+    Report().run(track=track, scene=scene, recording=sparse, run_folder=RunFolder(path=tmp_path, recipe={}))
+    assert "4 frames, 4 cameras, 10 per second" in (tmp_path / layout.REPORT).read_text()
 
 
 @pytest.mark.long

@@ -171,6 +171,25 @@ def test_landmarks_lie_where_their_names_say(body):
         np.testing.assert_allclose(at[f"{name}_r"], at[f"{name}_l"] * (-1, 1, 1), atol=0.005)
 
 
+def test_landmarks_are_found_in_whatever_order_a_body_lists_the_joints_of_a_vertex(body):
+    weight = np.ascontiguousarray(body.skin_weight[:, ::-1])  # the weakest first
+    joint = np.where(weight > 0, body.skin_joint[:, ::-1], 0).astype(np.int32)
+    expected, found = landmarks(body), landmarks(replace(body, skin_joint=joint, skin_weight=weight))
+    assert found.names == expected.names
+    np.testing.assert_array_equal(found.body.vertices, expected.body.vertices)
+
+
+def test_a_heel_that_is_a_plane_has_a_place(body):
+    """As that of a person who is put together from boxes: no vertex is farther back than most of them."""
+    vertices = body.vertices.copy()
+    low = vertices[:, 2] < body.positions[body.joint("ankle_l"), 2]
+    plane = np.quantile(vertices[low, 1], 0.9)
+    vertices[low, 1] = np.minimum(vertices[low, 1], plane)
+    marks = landmarks(replace(body, vertices=vertices))
+    length = plane - vertices[low, 1].min()
+    assert marks.body.vertices[marks.names.index("heel_l"), 1] == pytest.approx(plane - 0.07 * length, abs=1e-3)
+
+
 def test_derivatives_of_landmarks(body, pose):
     marks, spreads = landmarks(body), {"stature": 0.1, "thigh": 0.1, "trunk": 0.1}
     logs = np.array([0.05, -0.02, 0.03])

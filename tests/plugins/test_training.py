@@ -180,6 +180,13 @@ def test_a_hip_of_a_body_whose_thighs_point_ahead_at_rest(body: Body) -> None:
     np.testing.assert_allclose(training.from_columns(shown, ahead)["hip_l.flexion"], bends, atol=1e-3)
 
 
+def test_a_thigh_past_straight_up_is_bent_as_far_as_can_be_and_not_stretched(body: Body) -> None:
+    """Raised aside, above the level: nobody stretches a hip by 60 degrees, the least that is looked up."""
+    degrees = np.array([160.0, 179.0, -179.0, -160.0, -30.0])
+    bends = np.degrees(training.from_columns({"hip_flexion_l": degrees}, body)["hip_l.flexion"])
+    assert (bends[:4] > 150).all() and bends[4] == pytest.approx(-30, abs=5)
+
+
 def test_a_bvh_motion(tmp_path: Path) -> None:
     pytest.importorskip("bvhio")
     legs = "\n".join(LEG.format(side=side, x=x) for side, x in (("Left", 10), ("Right", -10)))

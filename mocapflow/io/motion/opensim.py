@@ -108,7 +108,8 @@ def _add_arm(found: dict[str, F64], frames: Mapping[str, F64], body: Body, place
     arm = [f"{joint}_{side}" for joint in ARM]
     if not set(arm) <= set(frames):
         return
-    chest = body.joint_names[body.parents[body.joint(arm[0])]]
+    # a clavicle is none of OpenSim's, and its turn is the arm's; an arm alone hangs on nothing
+    chest = "chest" if "chest" in frames else body.joint_names[max(int(body.parents[body.joint(arm[0])]), 0)]
     names = (f"arm_flex_{side}", f"arm_add_{side}", f"arm_rot_{side}")
     _add_turns(found, names, frames[chest], frames[arm[0]], 1.0 if side == "r" else -1.0)
     found[f"elbow_flex_{side}"] = angles.three_point(places[:, [body.joint(name) for name in arm]])

@@ -21,7 +21,7 @@ TIP = 0.05  # m, length drawn beyond the last joint of a limb
 def write(result: Result, path: Path) -> None:
     """Write skeleton and motion; at rest no joint is turned, so the rest pose is that of the body."""
     body, order = result.scene.body, depth_first(result.scene.body)
-    lines = ["HIERARCHY", *hierarchy(body, int(np.flatnonzero(body.parents < 0)[0]), 0), "MOTION"]
+    lines = ["HIERARCHY", *hierarchy(body, order[0], 0), "MOTION"]
     lines += [f"Frames: {len(result.track.frame)}", f"Frame Time: {1 / result.recording.run_rate:.8f}"]
     turns = Y_UP @ result.turns @ Y_UP.T
     angles = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_euler("ZXY", degrees=True)

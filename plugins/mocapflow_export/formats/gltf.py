@@ -75,12 +75,13 @@ class Author:
         columns = np.swapaxes(inverse, 1, 2).reshape(-1, 16).astype(np.float32)
         joints = list(range(1, len(body.parents) + 1))
         self._gltf.skins = [lib.Skin(joints=joints, inverseBindMatrices=self._add(columns))]
-        weight = body.skin_weight[:, :4]  # sorted, viewers read four
+        strongest = np.argsort(-body.skin_weight, axis=1, kind="stable")[:, :4]  # viewers read four
+        weight, carrier = (np.take_along_axis(of, strongest, 1) for of in (body.skin_weight, body.skin_joint))
         weight = weight / weight.sum(axis=1, keepdims=True)
         attributes = lib.Attributes(
             POSITION=self._add(body.vertices.astype(np.float32), vertices=True),
             NORMAL=self._add(meshes.vertex_normals(body.vertices, body.faces).astype(np.float32)),
-            JOINTS_0=self._add(np.where(weight > 0, body.skin_joint[:, :4], 0).astype(np.uint16)),
+            JOINTS_0=self._add(np.where(weight > 0, carrier, 0).astype(np.uint16)),
             WEIGHTS_0=self._add(weight.astype(np.float32)),
         )
         primitive = lib.Primitive(attributes=attributes, indices=self._indices(body.faces), material=0)

@@ -6,12 +6,10 @@ from pathlib import Path
 
 from mocapflow_export import tables
 from mocapflow_export.formats.result import Result, library
-from mocapflow_export.uncertainty import measured
 
 
 def write(result: Result, path: Path) -> None:
     """Write frame, time, and of every angle value, standard deviation (degrees) and observed share."""
-    track = result.track
-    series = measured(track, result.scene)
-    table = library("pyarrow", "parquet").table({**tables.angle_columns(track, series), "frame": track.frame})
+    columns = tables.angle_columns(result.track, result.angles)
+    table = library("pyarrow", "parquet").table({**columns, "frame": result.track.frame})
     library("pyarrow.parquet", "parquet").write_table(table, path)

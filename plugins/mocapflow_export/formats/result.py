@@ -11,10 +11,12 @@ import numpy as np
 from mocapflow.data import NO_CLOTH, PoseBatch, Surface
 from mocapflow.errors import PipelineError
 from mocapflow.geometry import kinematics
+from mocapflow.geometry.angles import AngleSeries
 from mocapflow.recordings.recording import Recording
 from mocapflow.records import F64, record
 from mocapflow.results import Track, ViewChecks
 from mocapflow.scene import Scene
+from mocapflow_export.uncertainty import measured
 
 
 @record
@@ -43,6 +45,11 @@ class Result:
         relative: F64 = np.swapaxes(world[:, parents], -1, -2) @ world
         relative[:, parents < 0] = world[:, parents < 0]
         return relative
+
+    @cached_property
+    def angles(self) -> AngleSeries:
+        """The angles, with calibrated deviations."""
+        return measured(self.track, self.scene)
 
     def surface(self, row: int) -> Surface:
         """Return body and garment in one frame."""

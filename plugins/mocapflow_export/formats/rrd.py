@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mocapflow.geometry import angles, silhouettes
+from mocapflow.geometry import silhouettes
 from mocapflow.results import rows_with_frames
 from mocapflow_export.formats.result import Result, library
 
@@ -62,9 +62,7 @@ def log_model(rr: Any, stream: Any, result: Result, row: int) -> None:
     stream.log("world/skeleton", rr.LineStrips3D(bones))
     names = list(scene.body.joint_names)
     stream.log("world/joints", rr.Points3D(result.places[row], labels=names, show_labels=False, radii=DOT))
-    pose = track.root[row : row + 1], track.angles[row : row + 1]
-    series = angles.measure(scene.body, *pose)
-    for name, value in zip(series.names, series.value[0], strict=True):
+    for name, value in zip(result.angles.names, result.angles.value[row], strict=True):
         stream.log(f"angles/{name}", rr.Scalars(value))
 
 
