@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from mocapflow import load_registry
+from mocapflow import load_pipeline, load_registry
 from mocapflow.help.manual import manual
 
 ROOT = Path(__file__).parents[1]
@@ -31,6 +31,14 @@ def test_the_plugin_in_contributing_loads_and_conforms(tmp_path: Path) -> None:
     run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, env=env)
     assert run.returncode == 0, run.stdout
     assert "11 passed" in run.stdout
+
+
+def test_the_pipeline_in_contributing_uses_the_plugin(tmp_path: Path) -> None:
+    (tmp_path / "toes_ahead.py").write_text(blocks("CONTRIBUTING.md", "python")[0], encoding="utf-8")
+    (pipeline,) = blocks("CONTRIBUTING.md", "yaml")
+    (tmp_path / "mine.yaml").write_text(pipeline.replace("pipelines/", f"{ROOT}/pipelines/"), encoding="utf-8")
+    track = next(named.stage for named in load_pipeline(tmp_path / "mine.yaml").stages if named.label == "track")
+    assert [prior.name for prior in track.priors][-2:] == ["parzen", "toes_ahead"]  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize(("document", "least"), [("README.md", 5), ("CONTRIBUTING.md", 1), ("docs/tutorial.md", 7)])

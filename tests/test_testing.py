@@ -141,6 +141,22 @@ def test_conformance_finds_a_vertex_that_lies_on_no_strand():
         tests.test_every_vertex_lies_on_one_strand()
 
 
+def test_conformance_says_how_far_a_pin_is_from_the_skin():
+    class Wide(Garment):
+        """Stands off at the waist."""
+
+        name = "wide"
+
+        def sew(self, body):
+            mesh = tiny_garment(body)
+            return replace(mesh, vertices=mesh.vertices * [2.0, 2.0, 1.0])
+
+    tests = GarmentConformance()
+    tests.garment = Wide()
+    with pytest.raises(AssertionError, match=r"a pin is 0\.\d+ m from vertex \d+, .*; at most 0\.1 m: begin nearer"):
+        tests.test_pins_lie_on_the_body()
+
+
 def test_conformance_finds_a_garment_that_no_draper_can_lay():
     class Unhung(Garment):
         """Has one strand that nothing holds."""

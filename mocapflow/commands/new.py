@@ -10,6 +10,8 @@ import typer
 
 from mocapflow.help import scaffold
 
+ROLES = ", ".join(scaffold.KINDS)
+
 app = typer.Typer(help="Begin something of your own.", no_args_is_help=True)
 
 
@@ -21,7 +23,9 @@ def _new() -> None:
 @app.command()
 def plugin(
     name: Annotated[str, typer.Argument(help="Of the package, without mocapflow-: my-dress.")],
-    role: Annotated[str, typer.Option(help=f"What it adds: {', '.join(scaffold.KINDS)}.")] = "garment",
+    role: Annotated[
+        str, typer.Option(help=f"What it adds: {ROLES}. A stage makes, changes or writes a track.")
+    ] = "garment",
     out: Annotated[Path | None, typer.Option(help="The folder to make.", show_default="mocapflow-NAME")] = None,
 ) -> None:
     """Write a plugin package that works: a module, its test, ready to install and to be changed."""

@@ -52,7 +52,7 @@ def changed(document: Document, target: str, new: Document) -> Document:
     Args:
         document: as it was; it is left alone.
         target: the path, as `stages.track.draper`, or with its place: `stages.corrupt before background`. What is in a
-            list is named, `stages.track.priors.parzen`, or numbered from 0.
+            list is named, `stages.track.priors.parzen`, or numbered from 0; a component of that name is added to it.
         new: the value, and where it was written.
 
     Raises:
@@ -61,7 +61,7 @@ def changed(document: Document, target: str, new: Document) -> Document:
     path, _, successor = target.partition(BEFORE)
     where = new.place(()).text
     values = deepcopy(document.values)
-    holder, steps = _holder_of(values, path.split("."), where)
+    holder, steps = _holder_of(values, path.split("."), new.values, where)
     key, siblings = steps[-1], steps[:-1]
     if new.values is None and siblings == STAGES and isinstance(holder, dict) and key not in holder:
         hint = alternatives(str(key), holder)
@@ -74,8 +74,10 @@ def changed(document: Document, target: str, new: Document) -> Document:
     return Document(values, {**kept, **{(*steps, *at): place for at, place in new.places.items()}})
 
 
-def _holder_of(values: Any, parts: list[str], where: str) -> tuple[Any, KeyPath]:
+def _holder_of(values: Any, parts: list[str], value: Any, where: str) -> tuple[Any, KeyPath]:
     """Return the mapping or list that holds the value at a path, opened to be written into, and the way to the value.
+
+    A list is made longer by one where the path names what it lacks, and the value is a component of that name.
 
     Raises:
         PipelineError: there is no such path.
@@ -85,8 +87,12 @@ def _holder_of(values: Any, parts: list[str], where: str) -> tuple[Any, KeyPath]
     for part in parts:
         if steps:
             holder = _opened(holder, steps[-1])
+        last = len(steps) == len(parts) - 1
+        if last and isinstance(holder, list) and part == _name(value) and part not in map(_name, holder):
+            holder.append(None)
+            return holder, (*steps, len(holder) - 1)
         key = _entry(holder, part) if isinstance(holder, list) else part
-        if not _may_hold(holder, key, last=len(steps) == len(parts) - 1):
+        if not _may_hold(holder, key, last):
             known = _entries(holder) if isinstance(holder, list) else holder if isinstance(holder, dict) else ()
             message = f"there is no '{dotted((*steps, part))}'"
             raise PipelineError(message, where=where, hint=alternatives(part, known))
@@ -104,8 +110,13 @@ def _entry(entries: list[Any], part: str) -> str | int:
 
 def _entries(entries: list[Any]) -> list[str]:
     """Return how a path may name the entries of a list: components by names that no other has, others by indices."""
-    names = [entry.get("use") if isinstance(entry, dict) else entry for entry in entries]
+    names = [_name(entry) for entry in entries]
     return [name if isinstance(name, str) and names.count(name) == 1 else str(k) for k, name in enumerate(names)]
+
+
+def _name(entry: Any) -> Any:
+    """Return the name of a component as a file writes it; anything else as it is."""
+    return entry.get("use") if isinstance(entry, dict) else entry
 
 
 def _moved(holder: Any, key: str | int, successor: str) -> bool:

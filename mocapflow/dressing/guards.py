@@ -10,6 +10,8 @@ from mocapflow.assets import Body, GarmentMesh
 from mocapflow.data import Past, Pose, PoseBatch
 from mocapflow.dressing.pieces import pieces_of
 from mocapflow.dressing.roles import BodyModel, Draper, Garment
+from mocapflow.geometry.skeleton import skeleton_of
+from mocapflow.io.subject.skeleton import check_size
 from mocapflow.output_checks import UNIT, InvalidOutput, array_of, of_kind
 from mocapflow.records import F64, I32, out_of_range
 from mocapflow.scene import Scene
@@ -24,6 +26,7 @@ def body_of(model: BodyModel, recording: Path) -> Body:
 
     Raises:
         InvalidOutput: it is not finite, or its skin or joints would not move as a body does.
+        RecordingError: it is not in metres, not upright along z, or its joints lie outside.
     """
     body = of_kind(model, model.load(recording), Body)
     array_of(model, body.vertices, body.vertices.shape, "vertices")
@@ -33,6 +36,7 @@ def body_of(model: BodyModel, recording: Path) -> Body:
     ):
         if not np.allclose(values, 1, rtol=0, atol=UNIT):
             raise InvalidOutput(model, what)
+    check_size(body.vertices, skeleton_of(body), f"body '{model.name}'")
     return body
 
 

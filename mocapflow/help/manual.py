@@ -18,8 +18,9 @@ INTRODUCTION = """# Settings
 Written by `mocapflow settings` from the code; do not edit. What has no default has to be given. A component is named
 in a pipeline file, with its settings where they differ from the defaults: `draper: kinematic`, or
 `draper: {use: kinematic, sweeps: 4}`; a dotted name is a setting of a group: `steady: {turns: 3}`. On the command line:
-`--set stages.track.steady.turns=3`. What is in a list goes by its name, or its number from 0, and null leaves it out:
-`--set stages.track.priors.smooth_motion.angle_sd_deg=5 --set stages.track.priors.parzen=null`.
+`--set stages.track.steady.turns=3`. What is in a list goes by its name, or its number from 0, and null leaves it out;
+what is not in it yet is added by its name: `--set stages.track.priors.smooth_motion.angle_sd_deg=5
+--set stages.track.priors.parzen=null --set stages.track.priors.ground_plane=ground_plane`.
 """
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from string import Template
 from typing import NamedTuple
 
-from mocapflow.errors import PluginError, alternatives
+from mocapflow.errors import PluginError
 
 TEMPLATES = Path(__file__).parent / "templates"
 NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
@@ -19,25 +19,33 @@ class Kind(NamedTuple):
     """What the templates of a role are filled with."""
 
     conformance: str
-    usage: str  # in a pipeline
-    extra_import: str = ""
-    extra_body: str = ""
+    usage: str  # a line under `change` of a pipeline
+    imports: str = "from mocapflow.testing import $conformance"  # of the test
+    body: str = ""  # of the test, after the component
 
 
 KINDS: Mapping[str, Kind] = {
-    "cloth_fitter": Kind("ClothFitterConformance", "`stages.track.cloth_fitter: $module`"),
-    "draper": Kind("DraperConformance", "`stages.track.draper: $module`"),
+    "body": Kind(
+        "BodyConformance",
+        "body: $module",
+        "from mocapflow.help.shipped import shipped\nfrom mocapflow.testing import BodyConformance",
+        '\n    recording = shipped("examples", "data", "skirt_steps")  # whose person it is',
+    ),
+    "cloth_fitter": Kind("ClothFitterConformance", "stages.track.cloth_fitter: $module"),
+    "draper": Kind("DraperConformance", "stages.track.draper: $module"),
     "garment": Kind(
         "GarmentConformance",
-        "`garment: $module`",
-        ", template_body",
+        "garment: $module",
+        "from mocapflow.testing import GarmentConformance, template_body",
         "\n    make_body = staticmethod(template_body)  # the usual body for tests has no shoulders",
     ),
-    "matcher": Kind("MatcherConformance", "add `$module` to `stages.track.matchers`"),
-    "predictor": Kind("PredictorConformance", "`stages.track.predictor: $module`"),
-    "prior": Kind("PriorConformance", "add `$module` to `stages.track.priors`"),
-    "segmenter": Kind("SegmenterConformance", "`stages.track.segmenter: $module`"),
-    "stage": Kind("StageConformance", "a stage behind `smooth`, or `--set stages.$module=$module`"),
+    "matcher": Kind("MatcherConformance", "stages.track.matchers.$module: $module"),
+    "pose_solver": Kind("PoseSolverConformance", "stages.track.pose_solver: $module"),
+    "predictor": Kind("PredictorConformance", "stages.track.predictor: $module"),
+    "prior": Kind("PriorConformance", "stages.track.priors.$module: $module"),
+    "recovery": Kind("RecoveryConformance", "stages.track.recovery: $module"),
+    "segmenter": Kind("SegmenterConformance", "stages.track.segmenter: $module"),
+    "stage": Kind("StageConformance", "stages.$module: $module"),
 }
 
 
@@ -45,8 +53,9 @@ def write_plugin(name: str, role: str, folder: Path) -> list[Path]:
     """Write a plugin package into a new folder and return its files.
 
     Raises:
-        PluginError: the name can't be one, nobody wrote templates for the role, the package, one of this role and name
-            or the folder is there already, or the folder can't be written.
+        UnknownComponent: there is no such role.
+        PluginError: the name can't be one, the package, one of this role and name or the folder is there already, or
+            the folder can't be written.
     """
     module = name.replace("-", "_")
     _check(name, module, role, folder)
@@ -59,8 +68,8 @@ def write_plugin(name: str, role: str, folder: Path) -> list[Path]:
         "role": role,
         "usage": Template(kind.usage).substitute(module=module),
         "conformance": kind.conformance,
-        "imports": kind.conformance + kind.extra_import,
-        "body": kind.extra_body,
+        "imports": Template(kind.imports).substitute(conformance=kind.conformance),
+        "body": kind.body,
     }
     files = {
         "pyproject.toml": "pyproject.toml.txt",
@@ -75,14 +84,13 @@ def _check(name: str, module: str, role: str, folder: Path) -> None:
     """Raise if such a package can't be written, or could not be used."""
     from mocapflow.registry import load_registry
 
-    if role not in KINDS:
-        raise PluginError(f"there are no templates for a {role}", hint=alternatives(role, KINDS))
+    provided = load_registry().provided(role)
     if not NAME.fullmatch(name):
         hint = "lower-case letters, digits and single hyphens, a letter first: my-dress"
         raise PluginError(f"'{name}' can't be the name of a package", hint=hint)
     if find_spec(package := f"mocapflow_{module}"):
         raise PluginError(f"there is a package {package} already", hint="plugins of one name hide each other")
-    if module in load_registry().provided(role):
+    if module in provided:
         hint = "no pipeline could name either of the two; choose another name"
         raise PluginError(f"there is a {role} '{module}' already", hint=hint)
     if folder.exists():

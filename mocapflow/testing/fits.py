@@ -29,8 +29,8 @@ class PriorConformance(Conformance):
     bounds_energy = False
     tolerance = 1e-5
 
-    @pytest.mark.parametrize("known", [0, 1, 2])
-    @pytest.mark.parametrize("size", [0.1, 0.6])
+    @pytest.mark.parametrize("known", [0, 1, 2], ids="{} frames before".format)
+    @pytest.mark.parametrize("size", [0.1, 0.6], ids="{} rad off".format)
     def test_its_jacobian_is_its_derivative(self, known: int, size: float) -> None:
         """Error, Jacobian and energy agree with each other, whatever is known of earlier frames."""
         scene = scenes.tiny_scene()

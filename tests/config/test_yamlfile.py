@@ -89,6 +89,32 @@ def test_what_is_in_a_list_has_its_name_or_its_number(folder):
     assert document.place(("stages", "track", "matchers", 1, "share")).text.startswith("--set")
 
 
+def test_what_a_list_lacks_is_added_by_its_name(folder):
+    def matchers(*changes):
+        return read(Path("base.yaml"), changes).values["stages"]["track"]["matchers"]
+
+    first = ["contour_icp", {"use": "keypoints", "share": 0.5}]
+    assert matchers("stages.track.matchers.mine=mine") == [*first, "mine"]
+    own = {"use": "mine", "share": 2}
+    assert matchers("stages.track.matchers.mine={use: mine, share: 2}") == [*first, own]
+    assert matchers("stages.track.matchers.mine=mine", "stages.track.matchers.mine.share=2") == [*first, own]
+    assert matchers("stages.track.matchers.keypoints=keypoints") == ["contour_icp", "keypoints"]
+    document = read(Path("base.yaml"), ["stages.track.matchers.mine={use: mine, share: 2}"])
+    assert document.place(("stages", "track", "matchers", 2, "share")).text.startswith("--set")
+
+
+@pytest.mark.parametrize("value", ["other", "{use: other}", "{share: 2}", "2", "null"])
+def test_nothing_is_added_to_a_list_under_another_name(folder, value):
+    with pytest.raises(PipelineError, match=r"there is no 'stages.track.matchers.mine'"):
+        read(Path("base.yaml"), [f"stages.track.matchers.mine={value}"])
+
+
+def test_no_third_is_added_where_two_are_alike(folder):
+    twice = "stages.track.matchers=[contour_icp, {use: contour_icp, share: 2}]"
+    with pytest.raises(PipelineError, match=r"no 'stages.track.matchers.contour_icp'\n +available: 0, 1"):
+        read(Path("base.yaml"), [twice, "stages.track.matchers.contour_icp=contour_icp"])
+
+
 def test_of_two_alike_in_a_list_the_number_tells_which(folder):
     twice = "stages.track.matchers=[contour_icp, {use: contour_icp, share: 2}, keypoints]"
     with pytest.raises(PipelineError, match=r"no 'stages.track.matchers.contour_icp'\n +available: 0, 1, keypoints"):

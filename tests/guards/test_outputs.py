@@ -13,7 +13,7 @@ from mocapflow.components import ClothFitter, Matcher, PoseSolver, Predictor, Pr
 from mocapflow.data import NO_CLOTH, Matches, Past, Pose, Residual, Start, Turn
 from mocapflow.dressing.guards import body_of, mesh_of
 from mocapflow.dressing.roles import BodyModel, Draper, Garment
-from mocapflow.errors import MocapflowError
+from mocapflow.errors import MocapflowError, RecordingError
 from mocapflow.guards.outputs import (
     cloth_of,
     estimate_of,
@@ -365,6 +365,13 @@ def test_bodies_that_are_none(change, said):
     assert body_of(Dressing(output=BODY), Path()) is BODY
     with pytest.raises(InvalidOutput, match=f"'dressing' returned {said}"):
         body_of(Dressing(output=replace(BODY, **change)), Path())
+
+
+def test_a_body_in_millimetres_or_apart_from_its_joints():
+    with pytest.raises(RecordingError, match=r"body 'dressing'  the mesh measures .* in millimetres: divide by 1000"):
+        body_of(Dressing(output=replace(BODY, vertices=1000 * BODY.vertices)), Path())
+    with pytest.raises(RecordingError, match=r"7 of 7 joints lie more than 10 cm outside the mesh, first 'pelvis'"):
+        body_of(Dressing(output=replace(BODY, positions=1000 * BODY.positions)), Path())
 
 
 MESH = CLOTHED.garment
