@@ -59,8 +59,8 @@ def _beside(bodies: Mapping[str, Bool], somebody: Mapping[str, Bool], folder: Pa
         hint = "was the plate taken with the person in it, or does the person come in later?"
         yield warning(f"the first frame of {', '.join(empty)} differs nowhere from its clean plate", hint, folder)
     somebody = {name: seen for name, seen in somebody.items() if name not in empty}
-    whole = [name for name in somebody if bodies[name].any() and not bodies[name][[0, -1]].any()]
-    heights = [_height(bodies[name]) / _height(_largest(somebody[name])) for name in whole]
+    views = [(bodies[name], _largest(seen)) for name, seen in somebody.items() if bodies[name].any()]
+    heights = [_height(body) / _height(seen) for body, seen in views if not _is_cut(body, seen)]
     times = float(np.median(heights)) if 2 * len(heights) > len(somebody) else 1.0
     if not SMALL < times < LARGE:
         hint = (
@@ -70,6 +70,11 @@ def _beside(bodies: Mapping[str, Bool], somebody: Mapping[str, Bool], folder: Pa
         yield warning(f"at the first pose the body is {times:.1f} times as tall as who is seen", hint, folder)
     else:
         yield from _nobody_there(bodies, somebody, folder)
+
+
+def _is_cut(body: Bool, seen: Bool) -> bool:
+    """Return whether a picture ends within a body, or what is seen goes through from top to bottom, as a light does."""
+    return bool(body[[0, -1]].any() or seen[[0, -1]].any(axis=1).all())
 
 
 def _height(mask: Bool) -> int:
