@@ -127,6 +127,22 @@ def test_faces_that_look_both_ways(good):
     assert errors(good) == ["its faces look both inward and outward: at 2 % of the edges two disagree"]
 
 
+@pytest.mark.parametrize("up", [-0.05, 0.05])
+def test_a_scan_that_does_not_stand_on_the_floor(good, up):
+    mesh, bones = good / "subject" / "body.obj", good / "subject" / "skeleton.json"
+    lines = [line.split() for line in mesh.read_text().splitlines()]
+    mesh.write_text("\n".join(" ".join([*k[:3], str(float(k[3]) + up)] if k[0] == "v" else k) for k in lines))
+    edit(bones, lambda s: [j["position"].__setitem__(2, j["position"][2] + up) for j in s["joints"]])
+    assert any(said.startswith(f"the scan begins at z = {up:.2f} m") for said in messages(good, "warning"))
+
+
+def test_a_scan_with_the_floor_in_it(good):
+    (good / "subject" / "weights.npz").unlink()
+    mesh = good / "subject" / "body.obj"
+    mesh.write_text(mesh.read_text() + "v -0.6 -0.6 0\nv 0.6 -0.6 0\nv 0.6 0.6 0\nf -3 -2 -1\n")
+    assert any(said.startswith("the scan reaches 0.8 m beside all bones") for said in messages(good, "warning"))
+
+
 def test_mesh_without_skeleton(good):
     (good / "subject" / "skeleton.json").unlink()
     (finding,) = [f for f in examine(good) if f.severity == "error"]
