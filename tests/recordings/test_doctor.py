@@ -17,7 +17,7 @@ from mocapflow.io.cameras import rigs
 from mocapflow.io.cameras.pose2sim import write_cameras
 from mocapflow.recordings.doctor import examine, examine_timing
 from mocapflow.recordings.recording import open_recording
-from tests.fixtures.recordings import avi_frames, look_at, ring, write_recording, write_video
+from tests.fixtures.recordings import avi_frames, look_at, ring, write_recording, write_reordered, write_video
 from tests.io.cameras.test_calibration import write_easymocap
 
 DEMO = Path(__file__).parents[2] / "examples" / "data"
@@ -243,6 +243,13 @@ def test_lost_frames_are_named(tmp_path):
     path.write_bytes(content)
     assert messages(tmp_path, "warning") == ["cam02: frame 8 can't be decoded"]
     assert errors(tmp_path) == []
+
+
+def test_frames_that_a_camera_left_out_are_not_called_damaged(tmp_path):
+    write_recording(tmp_path, frames=20)
+    write_reordered(tmp_path / "videos" / "cam02.mp4", 20, without=(13,))
+    absent = [said for said in messages(tmp_path, "warning") if "missing in the video: its time stamps jump" in said]
+    assert len(absent) == 1 and absent[0].startswith("cam02: frame")
 
 
 def test_images_that_are_damaged_missing_or_of_another_size_are_named(tmp_path):
