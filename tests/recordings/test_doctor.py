@@ -15,6 +15,7 @@ from mocapflow.geometry import twists
 from mocapflow.geometry.cameras import magnification
 from mocapflow.io.cameras import rigs
 from mocapflow.io.cameras.pose2sim import write_cameras
+from mocapflow.io.subject.first_pose import read_first_pose
 from mocapflow.recordings.doctor import examine, examine_timing
 from mocapflow.recordings.recording import open_recording
 from tests.fixtures.recordings import avi_frames, look_at, ring, write_recording, write_reordered, write_video
@@ -423,6 +424,13 @@ def test_first_pose(good, change, message, hint):
     (finding,) = [f for f in examine(good) if f.severity == "error"]
     assert finding.message == message
     assert hint in finding.hint
+
+
+def test_turns_that_may_be_in_degrees(good):
+    edit(good / "init.json", lambda p: p["joint_rotations"].update(knee_l=[5.0, 0, 0], knee_r=[3.2, 0, 0]))
+    assert messages(good, "warning")[0] == "'knee_l' turns by 5.0 rad, more than half around: is it in degrees?"
+    assert not any("knee_r" in said for said in messages(good, "warning")) and errors(good) == []
+    assert read_first_pose(good / "init.json", ()).turns["knee_l"].tolist() == [5.0, 0.0, 0.0]
 
 
 def test_skeleton_and_weights_against_the_mesh(good):
