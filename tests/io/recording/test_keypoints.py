@@ -77,7 +77,7 @@ def test_everything_odd_is_said(tmp_path):
     for frame in (4, 5, 6):
         write(tmp_path / f"c.{frame}.json", person())
     assert odd_keypoints(CAMERA, tmp_path, 6) == [
-        "cam02: keypoints of frame 2 can't be read: nobody is seen there",
+        "cam02: keypoints of frame 2 can't be read (not JSON: Expecting value): nobody is seen there",
         "cam02: keypoints of frame 0 are not all numbers (NaN): these points count as not seen",
         "cam02: keypoints of frame 6 lie after the last frame, 5: they are left out",
         "cam02: keypoints of frame 3 are missing: nobody is seen there",
@@ -99,6 +99,13 @@ def test_confidences_that_are_none(tmp_path, points):
     write(tmp_path / "c.0.json", points)
     assert odd_keypoints(CAMERA, tmp_path, 1) == [
         "cam02: keypoints of frame 0 have confidences far beyond 1: are they percents, or is there none behind x and y?"
+    ]
+
+
+def test_points_without_a_confidence(tmp_path):
+    write(tmp_path / "c.0.json", person(17)[:, :2])
+    assert odd_keypoints(CAMERA, tmp_path, 1) == [
+        "cam02: keypoints of frame 0 can't be read (34 numbers, which are not three a point): nobody is seen there"
     ]
 
 
