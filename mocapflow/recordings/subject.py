@@ -42,7 +42,7 @@ def _examine_scan(subject: Path, findings: list[Finding]) -> Sequence[str]:
         attempt(lambda: check_winding(faces, str(body)), findings)
         attempt(lambda: check_size(vertices, skeleton, str(body)), findings)
         if not has_errors(findings):
-            findings.extend(warning(text, where=body) for text in odd_scan(vertices, skeleton))
+            findings.extend(warning(text, where=subject) for text in odd_scan(vertices, skeleton))
         if skin.exists() and not has_errors(findings):  # they would seem wrong, too
             attempt(lambda: read_weights(skin, skeleton, vertices), findings)
     return skeleton.names

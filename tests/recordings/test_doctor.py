@@ -137,6 +137,15 @@ def test_a_scan_that_does_not_stand_on_the_floor(good, up):
     assert any(said.startswith(f"the scan begins at z = {up:.2f} m") for said in messages(good, "warning"))
 
 
+@pytest.mark.parametrize(("lower", "told"), [(0.03, False), (0.1, True)])
+def test_a_knee_that_is_out_of_place(good, lower, told):
+    edit(good / "subject" / "skeleton.json", lambda s: s["joints"][2]["position"].__setitem__(2, 0.7 - lower))
+    assert json.loads((good / "subject" / "skeleton.json").read_text())["joints"][2]["name"] == "knee_l"
+    said = [text for text in messages(good, "warning") if "long on the left" in text]
+    thigh = "the thigh is 0.40 m long on the left, 0.30 m on the right: are hip and knee of both sides at their places?"
+    assert said[:1] == ([thigh] if told else [])
+
+
 def test_a_scan_with_the_floor_in_it(good):
     (good / "subject" / "weights.npz").unlink()
     mesh = good / "subject" / "body.obj"

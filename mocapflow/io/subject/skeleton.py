@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mocapflow.errors import RecordingError, alternatives
-from mocapflow.geometry.skeleton import Skeleton, body_directions, to_segment
+from mocapflow.geometry.skeleton import SEGMENTS, Skeleton, body_directions, to_segment
 from mocapflow.io.json_toml import place, read_json
 from mocapflow.records import F64
 
@@ -23,6 +23,7 @@ PAIRS = (("hip_l", "hip_r"), ("shoulder_l", "shoulder_r"))  # that tell left fro
 MARGIN = 0.1  # m that a joint may lie outside the box about the mesh
 LIFTED = 0.03  # m between the soles and z = 0
 ASIDE = 0.4  # m sideways from the nearest bone; fingers reach 0.2, as seen from above
+UNEVEN = 1.15  # a limb by that of the other side; people differ by some hundredths
 
 
 def read_skeleton(path: Path) -> Skeleton:
@@ -78,7 +79,8 @@ def check_size(vertices: F64, skeleton: Skeleton, where: str) -> None:
 
 
 def odd_scan(vertices: F64, skeleton: Skeleton) -> Iterator[str]:
-    """Say where a mesh (V, 3) m does not stand on the floor, and where it holds more than the person."""
+    """Say if a mesh (V, 3) m does not stand on the floor or holds more than the person, or joints are out of place."""
+    yield from _uneven(skeleton)
     lowest = float(vertices[:, 2].min())
     if abs(lowest) > LIFTED and any(name.startswith("ankle") for name in skeleton.names):
         yield f"the scan begins at z = {lowest:.2f} m: heights of garments are measured from z = 0, on which it stands"
@@ -89,6 +91,18 @@ def odd_scan(vertices: F64, skeleton: Skeleton) -> Iterator[str]:
         aside = np.minimum(aside, to_segment(vertices * (1, 1, 0), begin - bone, begin))
     if (farthest := float(aside.max())) > ASIDE:
         yield f"the scan reaches {farthest:.1f} m beside all bones: cut away what is not the person, such as the floor"
+
+
+def _uneven(skeleton: Skeleton) -> Iterator[str]:
+    """Say which limbs have another length on the left than on the right."""
+    at = dict(zip(skeleton.names, skeleton.positions, strict=True))
+    for limb, ends in SEGMENTS.items():
+        pairs = [[f"{end}_{side}" for end in ends] for side in "lr"]
+        if at.keys() >= {name for pair in pairs for name in pair}:
+            left, right = (float(np.linalg.norm(at[a] - at[b])) for a, b in pairs)
+            if not 1 / UNEVEN < left / right < UNEVEN:
+                what = f"the {limb.replace('_', ' ')} is {left:.2f} m long on the left, {right:.2f} m on the right"
+                yield f"{what}: are {' and '.join(ends)} of both sides at their places?"
 
 
 def _check_limbs(skeleton: Skeleton, path: Path) -> None:
