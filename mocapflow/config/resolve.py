@@ -82,6 +82,8 @@ class Resolver:
         if isinstance(value, dict) and isinstance(value.get("use"), str):
             return value["use"], {key: inner for key, inner in value.items() if key != "use"}
         hint = f"available: {', '.join(self.registry.names(role)) or 'none'}"
+        if isinstance(value, dict) and value and "use" not in value:  # under `change` it would replace the whole
+            hint = f"{hint}\nto change a part of it alone, write {dotted((*steps, next(iter(value))))}: ..."
         message = f"name a {role}, as `name` or as {{use: name, setting: value}}"
         raise self.located(PipelineError(message, hint=hint), steps)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Hashable, Iterable
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,10 @@ from mocapflow.errors import PipelineError, alternatives
 
 MOST_VALUES = 100_000  # of a file; aliases of aliases can stand for more than any memory holds
 LEADING_ZERO = re.compile(r"[-+]?0[0-9_]")  # 0x10 and 0b10 say themselves what they are
+HINTS = {  # by what YAML says
+    r"character '\t'": "indent with spaces, not with tabs",
+    "unknown escape character": "in double quotes a backslash begins a special character: write paths with / instead",
+}
 
 
 def read(path: Path, changes: Iterable[str] = (), folder: Path = Path()) -> Document:
@@ -65,7 +70,8 @@ def _parse(text: str, file: str, path: Path | None) -> Document:
     except yaml.MarkedYAMLError as error:
         where = built.where(error.problem_mark) if error.problem_mark else file
         context = f" ({error.context})" if error.context else ""
-        raise PipelineError(f"not YAML: {error.problem}{context}", where=where) from None
+        hint = next((hint for sign, hint in HINTS.items() if sign in str(error.problem)), "")
+        raise PipelineError(f"not YAML: {error.problem}{context}", where=where, hint=hint) from None
     except RecursionError:
         raise PipelineError("not YAML: values inside of values without an end", where=file) from None
     except yaml.YAMLError as error:
@@ -134,10 +140,10 @@ def _meant_as_text(node: yaml.Node) -> bool:
 def _extended(child: Document, path: Path) -> Document:
     if unknown := set(child.values) - {"extends", "change", "mocapflow"}:
         name = min(unknown)
-        raise PipelineError(
-            f"'{name}' has no place in a file that extends another: only `extends` and `change` do",
-            where=child.place((name,)).text, hint=f"write it as change: {{{name}: ...}}",
-        )  # fmt: skip
+        misspelt = get_close_matches(name, ("extends", "change"), 1)
+        hint = f"did you mean '{misspelt[0]}'?" if misspelt else f"write it as change: {{{name}: ...}}"
+        message = f"'{name}' has no place in a file that extends another: only `extends` and `change` do"
+        raise PipelineError(message, where=child.place((name,)).text, hint=hint)
     base = _base_of(child, path)
     if "mocapflow" in child.values:
         base = changed(base, "mocapflow", Document(child.values["mocapflow"], _places(child, ("mocapflow",))))
@@ -151,19 +157,26 @@ def _extended(child: Document, path: Path) -> Document:
 
 def _base_of(child: Document, path: Path) -> Document:
     """Return the file that another one, at a path, extends."""
-    extended = Path(os.path.normpath(path.parent / str(child.values["extends"])))
+    where, named = child.place(("extends",)).text, child.values["extends"]
+    if not isinstance(named, str):
+        raise PipelineError("extends: name one file", where=where, hint="extends: skirt.yaml")
+    extended = Path(os.path.normpath(path.parent / named))
+    if extended == Path(os.path.normpath(path)):
+        raise PipelineError("the file extends itself", where=where, hint="name the pipeline that it changes")
     try:
         base = _read_file(extended)
     except PipelineError as error:
         if error.where != str(extended):  # a line in there is wrong
             raise
         message = f"extends: {extended}: {error.message}"
-        raise PipelineError(message, where=child.place(("extends",)).text, hint=error.hint) from None
+        raise PipelineError(message, where=where, hint=error.hint) from None
     if "extends" in base.values:
-        message = f"{child.values['extends']} itself extends another file; `extends` goes one level deep"
-        root = os.path.normpath(Path(child.values["extends"]).parent / base.values["extends"])
+        message = f"{named} itself extends another file; `extends` goes one level deep"
+        root = os.path.normpath(Path(named).parent / str(base.values["extends"]))
         hint = f"extend {root} and copy what is under `change` in {extended.name}"
-        raise PipelineError(message, where=child.place(("extends",)).text, hint=hint)
+        if os.path.normpath(path.parent / root) == os.path.normpath(path):
+            message, hint = f"{named} extends this file, and this file extends it", "one of them has to say its stages"
+        raise PipelineError(message, where=where, hint=hint)
     return base
 
 

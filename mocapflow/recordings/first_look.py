@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from mocapflow.data import NO_CLOTH
 from mocapflow.dressing.guards import body_of
 from mocapflow.errors import MocapflowError
@@ -20,6 +22,8 @@ from mocapflow.scene import Scene
 
 FOREIGN = 0.5  # share of a picture that differs from its empty room: more, and it is no picture of that room
 COVERED = 0.5  # share of the body that shows somebody, 0.6 to 0.9 where the pose is about right: less, and nobody is
+EMPTY = 0.02  # pixels that differ from the empty room by those of the body: less is noise, 1.2 to 1.7 a person in cloth
+SMALL, LARGE = 0.7, 1.3  # height of the body by that of who is seen; 0.85 to 0.98 where it is the person's, with shadow
 
 
 def examine_first_frame(folder: Path, registry: Registry) -> Iterator[Finding]:
@@ -45,7 +49,46 @@ def examine_first_frame(folder: Path, registry: Registry) -> Iterator[Finding]:
     elif (bodies := _bodies(recording, registry)) is not None:
         if frame.hidden:
             bodies = [body & ~hidden for body, hidden in zip(bodies, frame.hidden, strict=True)]
-        yield from _nobody_there(dict(zip(names, bodies, strict=True)), somebody, folder)
+        yield from _beside(dict(zip(names, bodies, strict=True)), somebody, folder)
+
+
+def _beside(bodies: Mapping[str, Bool], somebody: Mapping[str, Bool], folder: Path) -> Iterator[Finding]:
+    """Yield what is odd about who is seen in views, by the names of their cameras, beside the body (H, W) there."""
+    empty = [name for name, seen in somebody.items() if seen.sum() < EMPTY * bodies[name].sum()]
+    if empty:
+        hint = "was the plate taken with the person in it, or does the person come in later?"
+        yield warning(f"the first frame of {', '.join(empty)} differs nowhere from its clean plate", hint, folder)
+    somebody = {name: seen for name, seen in somebody.items() if name not in empty}
+    views = [(bodies[name], _largest(seen)) for name, seen in somebody.items() if bodies[name].any()]
+    heights = [_height(body) / _height(seen) for body, seen in views if not _is_cut(body, seen)]
+    times = float(np.median(heights)) if 2 * len(heights) > len(somebody) else 1.0
+    if not SMALL < times < LARGE:
+        hint = (
+            "is it the scan of this person, are cameras and first pose in metres, and is the matrix of each camera\n"
+            "that of pictures of this size?"
+        )
+        yield warning(f"at the first pose the body is {times:.1f} times as tall as who is seen", hint, folder)
+    else:
+        yield from _nobody_there(bodies, somebody, folder)
+
+
+def _is_cut(body: Bool, seen: Bool) -> bool:
+    """Return whether a picture ends within a body, or what is seen goes through from top to bottom, as a light does."""
+    return bool(body[[0, -1]].any() or seen[[0, -1]].any(axis=1).all())
+
+
+def _height(mask: Bool) -> int:
+    """Return from which to which row, in px, a mask (H, W) that is not empty reaches."""
+    rows = np.flatnonzero(mask.any(axis=1))
+    return int(rows[-1] - rows[0]) + 1
+
+
+def _largest(mask: Bool) -> Bool:
+    """Return the largest connected part of a mask (H, W) that is not empty."""
+    import cv2
+
+    _, part, statistics, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8))
+    return np.asarray(part == 1 + statistics[1:, cv2.CC_STAT_AREA].argmax())
 
 
 def _nobody_there(bodies: Mapping[str, Bool], somebody: Mapping[str, Bool], folder: Path) -> Iterator[Finding]:
@@ -56,7 +99,10 @@ def _nobody_there(bodies: Mapping[str, Bool], somebody: Mapping[str, Bool], fold
         hint = "is it the pose of frame 0, in metres, in the world of the calibration?"
         yield warning("nobody stands where the first pose says", hint, folder / first_pose.FILE)
     elif odd:
-        hint = "are calibration and video its own, or were two cameras exchanged? the other views agree"
+        hint = (
+            "are calibration and video its own, were two cameras exchanged, does the clean plate show somebody, or is\n"
+            "the first pose off? the other views agree"
+        )
         yield warning(f"nobody stands where the first pose says in {', '.join(odd)}", hint, folder)
 
 

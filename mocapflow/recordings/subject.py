@@ -10,7 +10,7 @@ from mocapflow.io.findings import Finding, attempt, error, has_errors, warning
 from mocapflow.io.json_toml import read_json
 from mocapflow.io.subject.first_pose import FILE, odd_pose
 from mocapflow.io.subject.meshes import check_winding, read_mesh
-from mocapflow.io.subject.skeleton import check_size, read_skeleton
+from mocapflow.io.subject.skeleton import check_size, odd_scan, read_skeleton
 from mocapflow.io.subject.weights import read_weights
 
 
@@ -41,6 +41,8 @@ def _examine_scan(subject: Path, findings: list[Finding]) -> Sequence[str]:
         vertices, faces = mesh
         attempt(lambda: check_winding(faces, str(body)), findings)
         attempt(lambda: check_size(vertices, skeleton, str(body)), findings)
+        if not has_errors(findings):
+            findings.extend(warning(text, where=subject) for text in odd_scan(vertices, skeleton))
         if skin.exists() and not has_errors(findings):  # they would seem wrong, too
             attempt(lambda: read_weights(skin, skeleton, vertices), findings)
     return skeleton.names

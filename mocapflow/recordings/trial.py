@@ -122,7 +122,13 @@ def _looked_through(cameras: Sequence[Camera], videos: Sequence[Video], length: 
     for column, camera, video in zip(change.T, cameras, videos, strict=True):
         lost, found = look_through(video)
         column[:] = found[:length]
-        if lost := [index for index in lost if index < video.frames]:
+        lost = [index for index in lost if index < video.frames]
+        absent = [] if video.path.is_dir() else sorted({*lost} - {*video.numbers.tolist()})
+        if absent:
+            hint = "the view is not used in these frames; was it converted, or filmed at an automatic frame rate?"
+            what = f"{camera.name}: {name_frames(absent)} missing in the video: its time stamps jump"
+            yield warning(what, hint, video.path)
+        if lost := [index for index in lost if index not in absent]:
             why = "missing, damaged or of another size" if video.path.is_dir() else "can't be decoded"
             hint = "the view is not used in these frames, some perhaps made from damaged ones; others keep their places"
             yield warning(f"{camera.name}: {name_frames(lost)} {why}", hint, video.path)

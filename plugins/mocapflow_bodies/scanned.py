@@ -12,7 +12,7 @@ from pydantic import model_validator
 from mocapflow.assets import Body
 from mocapflow.dressing.roles import BodyModel
 from mocapflow.errors import RecordingError
-from mocapflow.io.subject.meshes import check_winding, read_mesh
+from mocapflow.io.subject.meshes import check_winding, outward, read_mesh
 from mocapflow.io.subject.skeleton import check_size, need_scan, read_skeleton
 from mocapflow.io.subject.weights import read_weights
 from mocapflow.records import F64
@@ -69,6 +69,7 @@ class Scanned(BodyModel):
         need_scan(subject / "body.obj")
         vertices, faces = read_mesh(subject / "body.obj")
         check_winding(faces, str(subject / "body.obj"))
+        faces = outward(vertices, faces)
         skeleton = read_skeleton(subject / "skeleton.json")
         check_size(vertices, skeleton, str(subject / "body.obj"))
         if (subject / "weights.npz").exists():

@@ -35,8 +35,8 @@ def quality_warnings(track: Track, cameras: Sequence[str]) -> list[str]:
     elif begins_badly(track.overlap[0]):
         least, most = np.nanmin(track.overlap[0]), np.nanmax(track.overlap[0])
         said.append(
-            f"the first frame fits badly, overlap {least:.2f} to {most:.2f}: is the first pose right? "
-            "look at overlay/; does it look the other way, or are left and right exchanged?"
+            f"the first frame fits badly, overlap {least:.2f} to {most:.2f}: is the first pose right, and is "
+            "the scan this person's? look at overlay/; does it look the other way, or are left and right exchanged?"
         )
     return said
 

@@ -189,6 +189,9 @@ def test_a_plugin_file_named_by_the_pipeline(folder):
         ("draper: kinematic", "draper: [kinematic]",
          "skirt.yaml:7:5  stages.track.draper: name a draper, as `name` or as {use: name, setting: value}\n"
          "       available: kinematic"),
+        ("draper: kinematic", "draper: {sweeps: 4}",
+         "skirt.yaml:7:5  stages.track.draper: name a draper, as `name` or as {use: name, setting: value}\n"
+         "       available: kinematic\n       to change a part of it alone, write stages.track.draper.sweeps: ..."),
         ("smooth: smooth", "smooth: {from: 3, use: smooth}",
          "skirt.yaml:10:12  stages.smooth.from: write {parameter: label of an earlier stage}"),
         ("recording: clip", "recording: clap",

@@ -161,7 +161,16 @@ def test_a_stage_can_be_put_before_another(folder):
          " (while parsing a flow sequence)"),
         ("a: 1\nb: c: d\n", "bad.yaml:2:5  not YAML: mapping values are not allowed here"),
         ("a:\n\tb: 1", "bad.yaml:2:1  not YAML: found character '\\t' that cannot start any token"
-         " (while scanning for the next token)"),
+         " (while scanning for the next token)\n       indent with spaces, not with tabs"),
+        ('a: "C:\\data"', "bad.yaml:1:8  not YAML: found unknown escape character 'd'"
+         " (while scanning a double-quoted scalar)\n"
+         "       in double quotes a backslash begins a special character: write paths with / instead"),
+        ("extends: base.yaml\nchanges: {}", "bad.yaml:2:1  'changes' has no place in a file that extends another: "
+         "only `extends` and `change` do\n       did you mean 'change'?"),
+        ("extends: [base.yaml]", "bad.yaml:1:1  extends: name one file\n       extends: skirt.yaml"),
+        ("extends: bad.yaml", "bad.yaml:1:1  the file extends itself\n       name the pipeline that it changes"),
+        ("extends: back.yaml", "bad.yaml:1:1  back.yaml extends this file, and this file extends it\n"
+         "       one of them has to say its stages"),
         ("a: 1\na: 2", "bad.yaml:2:1  'a' is written twice"),
         ("a: &a [*a]", "bad.yaml  not YAML: values inside of values without an end"),
         ("a: 1\nb: 0x_", "bad.yaml:2:4  not YAML: '0x_' is no int"),
@@ -178,11 +187,12 @@ def test_a_stage_can_be_put_before_another(folder):
         ("extends: base.yaml\nchange:\n  stages.trak.draper: x",
          "bad.yaml:3:3  there is no 'stages.trak'\n       available: track — did you mean 'track'?"),
         ("extends: basis.yaml", "bad.yaml:1:1  extends: basis.yaml: there is no such file\n"
-         "       available: bad.yaml, base.yaml, middle.yaml — did you mean 'base.yaml'?"),
+         "       available: back.yaml, bad.yaml, base.yaml, middle.yaml — did you mean 'base.yaml'?"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_told_with_line_and_column(folder, text, message):
     write("middle.yaml", "extends: base.yaml")
+    write("back.yaml", "extends: bad.yaml")
     with pytest.raises(PipelineError) as caught:
         read(write("bad.yaml", text))
     assert str(caught.value) == message

@@ -53,6 +53,13 @@ def test_files_are_kept_as_they_are(body):
     assert body.skin_weight[body.skin_weight > 0].min() >= 0.01 and not body.cut.any()
 
 
+def test_a_mesh_that_is_inside_out_is_turned(body, recording):
+    mesh = recording / "subject" / "body.obj"
+    lines = [f"v {x} {y} {z}" for x, y, z in body.vertices] + [f"f {c} {b} {a}" for a, b, c in body.faces + 1]
+    mesh.write_text("\n".join(lines))
+    np.testing.assert_array_equal(Scanned().load(recording).faces, body.faces)
+
+
 def test_cache_key_covers_every_file(recording):
     names = {path.name for path in Scanned().inputs(recording)}
     assert names == {"body.obj", "skeleton.json", "weights.npz"}

@@ -36,7 +36,9 @@ def test_a_first_frame_that_fits_badly():
     later = np.tile([0.93, 0.9, 0.95, 0.92], (7, 1))
     begun = replace(TRACK, overlap=np.vstack([[0.76, 0.88, np.nan, 0.82], later]))
     (said,) = quality_warnings(begun, NAMES)
-    assert said.startswith("the first frame fits badly, overlap 0.76 to 0.88: is the first pose right?")
+    assert said.startswith(
+        "the first frame fits badly, overlap 0.76 to 0.88: is the first pose right, and is the scan this person's?"
+    )
     hidden = np.vstack([[0.61, 0.9, 0.86, 0.93], later])  # something stands before the person in one view
     assert quality_warnings(replace(TRACK, overlap=hidden), NAMES) == []
     unseen = np.vstack([np.full(4, np.nan), later])

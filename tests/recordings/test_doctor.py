@@ -15,9 +15,10 @@ from mocapflow.geometry import twists
 from mocapflow.geometry.cameras import magnification
 from mocapflow.io.cameras import rigs
 from mocapflow.io.cameras.pose2sim import write_cameras
+from mocapflow.io.subject.first_pose import read_first_pose
 from mocapflow.recordings.doctor import examine, examine_timing
 from mocapflow.recordings.recording import open_recording
-from tests.fixtures.recordings import avi_frames, look_at, ring, write_recording, write_video
+from tests.fixtures.recordings import avi_frames, look_at, ring, write_recording, write_reordered, write_video
 from tests.io.cameras.test_calibration import write_easymocap
 
 DEMO = Path(__file__).parents[2] / "examples" / "data"
@@ -127,6 +128,31 @@ def test_faces_that_look_both_ways(good):
     assert errors(good) == ["its faces look both inward and outward: at 2 % of the edges two disagree"]
 
 
+@pytest.mark.parametrize("up", [-0.05, 0.05])
+def test_a_scan_that_does_not_stand_on_the_floor(good, up):
+    mesh, bones = good / "subject" / "body.obj", good / "subject" / "skeleton.json"
+    lines = [line.split() for line in mesh.read_text().splitlines()]
+    mesh.write_text("\n".join(" ".join([*k[:3], str(float(k[3]) + up)] if k[0] == "v" else k) for k in lines))
+    edit(bones, lambda s: [j["position"].__setitem__(2, j["position"][2] + up) for j in s["joints"]])
+    assert any(said.startswith(f"the scan begins at z = {up:.2f} m") for said in messages(good, "warning"))
+
+
+@pytest.mark.parametrize(("lower", "told"), [(0.03, False), (0.1, True)])
+def test_a_knee_that_is_out_of_place(good, lower, told):
+    edit(good / "subject" / "skeleton.json", lambda s: s["joints"][2]["position"].__setitem__(2, 0.7 - lower))
+    assert json.loads((good / "subject" / "skeleton.json").read_text())["joints"][2]["name"] == "knee_l"
+    said = [text for text in messages(good, "warning") if "long on the left" in text]
+    thigh = "the thigh is 0.40 m long on the left, 0.30 m on the right: are hip and knee of both sides at their places?"
+    assert said[:1] == ([thigh] if told else [])
+
+
+def test_a_scan_with_the_floor_in_it(good):
+    (good / "subject" / "weights.npz").unlink()
+    mesh = good / "subject" / "body.obj"
+    mesh.write_text(mesh.read_text() + "v -0.6 -0.6 0\nv 0.6 -0.6 0\nv 0.6 0.6 0\nf -3 -2 -1\n")
+    assert any(said.startswith("the scan reaches 0.8 m beside all bones") for said in messages(good, "warning"))
+
+
 def test_mesh_without_skeleton(good):
     (good / "subject" / "skeleton.json").unlink()
     (finding,) = [f for f in examine(good) if f.severity == "error"]
@@ -227,6 +253,13 @@ def test_lost_frames_are_named(tmp_path):
     path.write_bytes(content)
     assert messages(tmp_path, "warning") == ["cam02: frame 8 can't be decoded"]
     assert errors(tmp_path) == []
+
+
+def test_frames_that_a_camera_left_out_are_not_called_damaged(tmp_path):
+    write_recording(tmp_path, frames=20)
+    write_reordered(tmp_path / "videos" / "cam02.mp4", 20, without=(13,))
+    absent = [said for said in messages(tmp_path, "warning") if "missing in the video: its time stamps jump" in said]
+    assert len(absent) == 1 and absent[0].startswith("cam02: frame")
 
 
 def test_images_that_are_damaged_missing_or_of_another_size_are_named(tmp_path):
@@ -400,6 +433,13 @@ def test_first_pose(good, change, message, hint):
     (finding,) = [f for f in examine(good) if f.severity == "error"]
     assert finding.message == message
     assert hint in finding.hint
+
+
+def test_turns_that_may_be_in_degrees(good):
+    edit(good / "init.json", lambda p: p["joint_rotations"].update(knee_l=[5.0, 0, 0], knee_r=[3.2, 0, 0]))
+    assert messages(good, "warning")[0] == "'knee_l' turns by 5.0 rad, more than half around: is it in degrees?"
+    assert not any("knee_r" in said for said in messages(good, "warning")) and errors(good) == []
+    assert read_first_pose(good / "init.json", ()).turns["knee_l"].tolist() == [5.0, 0.0, 0.0]
 
 
 def test_skeleton_and_weights_against_the_mesh(good):

@@ -60,6 +60,29 @@ def test_a_first_pose_where_nobody_stands(clip, monkeypatch):
     assert said(clip) == []
 
 
+def test_a_matrix_of_pictures_of_another_size(clip):
+    half = np.array([[0.5, 1, 1], [1, 0.5, 1], [1, 1, 1]])
+    halved = [replace(camera, intrinsics=half * camera.intrinsics) for camera in read_cameras(clip / "cameras.toml")]
+    write_cameras(clip / "cameras.toml", halved)
+    assert said(clip) == ["at the first pose the body is 0.5 times as tall as who is seen"]
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_the_person_is_in_a_clean_plate(clip, count):
+    names = [camera.name for camera in read_cameras(clip / "cameras.toml")][:count]
+    for name in names:
+        _, first = cv2.VideoCapture(str(clip / "videos" / f"{name}.mp4")).read()
+        cv2.imwrite(str(clip / "background" / f"{name}.png"), first)
+    assert said(clip) == [f"the first frame of {', '.join(names)} differs nowhere from its clean plate"]
+
+
+def test_a_body_that_the_pictures_cut_is_not_measured(clip):
+    pose = json.loads((clip / "init.json").read_text())
+    pose["root_translation"][2] = 0.0
+    (clip / "init.json").write_text(json.dumps(pose))
+    assert said(clip) == ["nobody stands where the first pose says in cam04"]
+
+
 def test_a_camera_whose_calibration_is_another_s(clip):
     cameras = list(read_cameras(clip / "cameras.toml"))
     moved = cameras[1].camera_from_world.copy()

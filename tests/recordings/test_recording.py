@@ -346,6 +346,20 @@ def test_folders_of_images(tmp_path):
     assert open_recording(tmp_path).frame_rate == 60
 
 
+def test_folders_that_count_from_another_number(tmp_path):
+    write_cameras(tmp_path / "cameras.toml", ring())
+    for name, first in zip(NAMES, (1, 1, 0), strict=True):
+        (tmp_path / "videos" / name).mkdir(parents=True)
+        for number in range(4):
+            cv2.imwrite(str(tmp_path / "videos" / name / f"{number + first}.png"), picture(number))
+    assert refused(tmp_path) == (
+        f"{tmp_path / 'videos'}  the videos differ in length\n"
+        "       cam01: images 1 to 4, cam02: images 1 to 4, cam03: images 0 to 3\n"
+        "       images of one instant have one number in all folders: number them anew, or remove what others lack; "
+        "then `mocapflow doctor DIR --sync`"
+    )
+
+
 @pytest.mark.parametrize("first", [1, 240])
 def test_frame_0_is_the_first_image_that_any_camera_has(tmp_path, first):
     write_cameras(tmp_path / "cameras.toml", ring())

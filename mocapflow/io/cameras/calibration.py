@@ -88,4 +88,5 @@ def _check(camera: Camera, path: Path) -> None:
     if distance > FARTHEST:
         unit, factor = ("mm", 1000) if distance > MILLIMETRES else ("cm", 100)
         hint = f"lengths are in metres: divide every translation by {factor}"
+        hint += ";\nif their unit is a square of the calibration board, multiply by its side" if factor == 100 else ""
         raise bad(camera.name, path, f"stands {distance:.0f} m from the origin: the calibration is in {unit}", hint)

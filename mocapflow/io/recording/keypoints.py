@@ -7,12 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
+from mocapflow.assets import Camera
 from mocapflow.errors import RecordingError
 from mocapflow.io.json_toml import read_json
 from mocapflow.io.video.images import name_frames, numbered
 from mocapflow.records import F64
 
 SUREST = 2.0  # confidence; OpenPose's go a little beyond 1, per cent and pixels far
+NONE = "not a file of keypoints"
+MOSTLY = 0.5  # share of the points outside the picture; a tool may guess some for who is half in it
 FORM = 'expected OpenPose\'s format: {"people": [{"pose_keypoints_2d": [x, y, confidence, ...]}]}'
 
 
@@ -70,10 +73,22 @@ def read_keypoints(path: Path) -> F64:
     """
     content = read_json(path, FORM)
     try:
-        rows = [np.array(person["pose_keypoints_2d"], np.float64).reshape(-1, 3) for person in content["people"]]
+        rows = [_points(person["pose_keypoints_2d"]) for person in content["people"]]
         return np.stack(rows) if rows else np.empty((0, 0, 3))
     except (ValueError, TypeError, KeyError, OverflowError) as error:
-        raise RecordingError(f"not a file of keypoints: {error}", where=str(path), hint=FORM) from error
+        raise RecordingError(f"{NONE}: {error}", where=str(path), hint=FORM) from error
+
+
+def _points(numbers: Sequence[float]) -> F64:
+    """Return keypoints (K, 3) from a row of numbers.
+
+    Raises:
+        ValueError: they are no triples.
+    """
+    row = np.array(numbers, np.float64)
+    if row.size % 3:
+        raise ValueError(f"{row.size} numbers, which are not three a point")
+    return row.reshape(-1, 3)
 
 
 def people_at(files: Mapping[int, Path] | None, index: int) -> F64:
@@ -91,34 +106,42 @@ def people_at(files: Mapping[int, Path] | None, index: int) -> F64:
     return np.where(lost, 0.0, people)
 
 
-def odd_keypoints(camera: str, folder: Path, length: int, first: int = 0) -> list[str]:
+def odd_keypoints(camera: Camera, folder: Path, length: int, first: int = 0) -> list[str]:
     """Say what is odd about the keypoints of a camera with `length` frames; every file is read (60 us each).
 
     `first` is the number of frame 0's file.
     """
     files = keypoint_files(folder, first)
-    broken, gaps, unsure, counts, farthest = [], [], [], set(), 0.0
+    broken, gaps, unsure, counts, farthest, seen, outside = [], [], [], set(), 0.0, 0, 0
+    why = ""  # the first that can't be read can't
     for index, path in files.items():
         try:
             people = read_keypoints(path)
-        except RecordingError:
+        except RecordingError as error:
             broken.append(index)
+            why = why or error.message.removeprefix(f"{NONE}: ")
             continue
         counts |= {people.shape[1]} if len(people) else set()
         gaps += [index] if not np.isfinite(people).all() else []
         unsure += [index] if (people[..., 2] > SUREST).any() else []
         farthest = max(farthest, float(np.nanmax(np.abs(people[..., :2]), initial=0.0)))
+        known = people[people[..., 2] > 0, :2]
+        seen, outside = seen + len(known), outside + int(((known < 0) | (known > camera.size)).any(axis=1).sum())
     beyond, missing = [i for i in files if i >= length], [i for i in range(length) if i not in files]
     faults = (
-        (broken, "can't be read: nobody is seen there"),
+        (broken, f"can't be read ({why}): nobody is seen there"),
         (gaps, "are not all numbers (NaN): these points count as not seen"),
         (unsure, "have confidences far beyond 1: are they percents, or is there none behind x and y?"),
         (beyond, f"lie after the last frame, {length - 1}: they are left out"),
         (missing, "are missing: nobody is seen there"),
     )
-    odd = [f"{camera}: keypoints of {name_frames(indices)} {what}" for indices, what in faults if indices]
+    odd = [f"{camera.name}: keypoints of {name_frames(indices)} {what}" for indices, what in faults if indices]
+    name = camera.name
     if len(counts) > 1:
-        odd.append(f"{camera}: people with {' and with '.join(map(str, sorted(counts)))} keypoints in one folder")
+        odd.append(f"{name}: people with {' and with '.join(map(str, sorted(counts)))} keypoints in one folder")
     if 0 < farthest <= 1:
-        odd.append(f"{camera}: all keypoints lie within one pixel: are they shares of the picture? expected pixels")
+        odd.append(f"{name}: all keypoints lie within one pixel: are they shares of the picture? expected pixels")
+    if camera.size.all() and outside > MOSTLY * seen:
+        pictures = f"its pictures of {camera.size[0]} x {camera.size[1]} px"
+        odd.append(f"{name}: most keypoints lie outside {pictures}: are they of pictures of another size?")
     return odd

@@ -122,7 +122,7 @@ def keypoint_warnings(folder: Path, cameras: Sequence[Camera], length: int, imag
     numbers = first_numbers(places, image, length)
     for camera, place, first in zip(cameras, places, numbers, strict=True) if any(places) else ():
         missing = [f"{camera.name}: no keypoints, though others have them"]
-        said += odd_keypoints(camera.name, place, length, first) if place else missing
+        said += odd_keypoints(camera, place, length, first) if place else missing
     return said
 
 

@@ -16,7 +16,7 @@ from mocapflow.errors import RecordingError, alternatives
 from mocapflow.geometry import twists
 from mocapflow.geometry.joints import angles_from_rotations
 from mocapflow.io.cameras.calibration import FARTHEST
-from mocapflow.io.findings import Finding, error
+from mocapflow.io.findings import Finding, error, warning
 from mocapflow.io.json_toml import place, read_json
 from mocapflow.records import F64, array, record
 
@@ -30,6 +30,7 @@ FORM = (
 
 HIGHEST = 10.0  # m above the floor; a root joint that is higher is in other units
 MILLIMETRES = 500.0  # m from the origin; beyond, in millimetres, below, in centimetres
+HALF_TURN = 1.1 * math.pi  # rad; a rotation vector needs no more than pi, and one in degrees may be as short
 
 
 @record
@@ -49,10 +50,10 @@ def read_first_pose(path: Path, joints: Sequence[str]) -> FirstPose:
         joints: the names of the body's joints; empty: they are not compared.
 
     Raises:
-        RecordingError: the file can't be read, or something in it is odd; see `odd_pose`.
+        RecordingError: the file can't be read, or something in it is wrong; see `odd_pose`.
     """
     content = read_json(path, FORM)
-    for odd in odd_pose(path, content, joints):
+    for odd in filter(lambda finding: finding.severity == "error", odd_pose(path, content, joints)):
         raise RecordingError(odd.message, where=odd.where, hint=odd.hint)
     vectors = {key: np.array(vector, np.float64) for key, vector in _vectors(content).items()}
     rotation, position = (vectors.pop(key) for key in ROOT)
@@ -114,3 +115,5 @@ def _odd_vector(key: str, value: Any) -> Iterator[Finding]:
         yield error(f"the root joint is {size:.0f} m from the origin: it looks like {unit}", "lengths are in metres")
     elif key != "root_translation" and size > 2 * math.pi:
         yield error(f"'{key}' turns by {size:.1f} rad, more than once around: it looks like degrees", FORM)
+    elif key != "root_translation" and size > HALF_TURN:
+        yield warning(f"'{key}' turns by {size:.1f} rad, more than half around: is it in degrees?", FORM)

@@ -97,3 +97,13 @@ def check_winding(faces: I32, where: str) -> None:
         hint = "let a mesh program turn them all outward, e.g. Blender: Mesh > Normals > Recalculate Outside"
         message = f"its faces look both inward and outward: at {100 * share:.0f} % of the edges two disagree"
         raise RecordingError(message, where=where, hint=hint)
+
+
+def outward(vertices: F64, faces: I32) -> I32:
+    """Return the triangles (F, 3) of a mesh so that they look outward, if they agree on a side.
+
+    They all look inward, and the volume is negative, where a mesh was mirrored, or its program counts clockwise.
+    """
+    a, b, c = np.moveaxis((vertices - vertices.mean(axis=0))[faces], 1, 0)
+    volume = float(np.einsum("fi,fi->", a, np.cross(b, c)))
+    return faces if volume >= 0 else np.ascontiguousarray(faces[:, ::-1])

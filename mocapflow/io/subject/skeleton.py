@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mocapflow.errors import RecordingError, alternatives
-from mocapflow.geometry.skeleton import Skeleton, body_directions
+from mocapflow.geometry.skeleton import SEGMENTS, Skeleton, body_directions, to_segment
 from mocapflow.io.json_toml import place, read_json
 from mocapflow.records import F64
 
@@ -21,6 +21,9 @@ SHORTEST = 0.01  # m, a bone between joints whose angle is measured, and the way
 LIMBS = ("knee", "ankle", "elbow", "wrist")  # joints that end such a bone
 PAIRS = (("hip_l", "hip_r"), ("shoulder_l", "shoulder_r"))  # that tell left from right
 MARGIN = 0.1  # m that a joint may lie outside the box about the mesh
+LIFTED = 0.03  # m between the soles and z = 0
+ASIDE = 0.4  # m sideways from the nearest bone; fingers reach 0.2, as seen from above
+UNEVEN = 1.15  # a limb by that of the other side; people differ by some hundredths
 
 
 def read_skeleton(path: Path) -> Skeleton:
@@ -73,6 +76,33 @@ def check_size(vertices: F64, skeleton: Skeleton, where: str) -> None:
         hint = "both are expected in metres and in the same rest pose, z up"
         what = f"{outside.sum()} of {len(outside)} joints lie more than 10 cm outside the mesh"
         raise RecordingError(f"{what}, first '{skeleton.names[int(outside.argmax())]}'", where=where, hint=hint)
+
+
+def odd_scan(vertices: F64, skeleton: Skeleton) -> Iterator[str]:
+    """Say if a mesh (V, 3) m does not stand on the floor or holds more than the person, or joints are out of place."""
+    yield from _uneven(skeleton)
+    lowest = float(vertices[:, 2].min())
+    if abs(lowest) > LIFTED and any(name.startswith("ankle") for name in skeleton.names):
+        yield f"the scan begins at z = {lowest:.2f} m: heights of garments are measured from z = 0, on which it stands"
+    seen_from_above = skeleton._replace(positions=skeleton.positions * (1, 1, 0))
+    aside = np.full(len(vertices), np.inf)
+    for joint in range(len(skeleton.names)):
+        begin, bone = seen_from_above.positions[joint], seen_from_above.bone_before(joint)
+        aside = np.minimum(aside, to_segment(vertices * (1, 1, 0), begin - bone, begin))
+    if (farthest := float(aside.max())) > ASIDE:
+        yield f"the scan reaches {farthest:.1f} m beside all bones: cut away what is not the person, such as the floor"
+
+
+def _uneven(skeleton: Skeleton) -> Iterator[str]:
+    """Say which limbs have another length on the left than on the right."""
+    at = dict(zip(skeleton.names, skeleton.positions, strict=True))
+    for limb, ends in SEGMENTS.items():
+        pairs = [[f"{end}_{side}" for end in ends] for side in "lr"]
+        if at.keys() >= {name for pair in pairs for name in pair}:
+            left, right = (float(np.linalg.norm(at[a] - at[b])) for a, b in pairs)
+            if not 1 / UNEVEN < left / right < UNEVEN:
+                what = f"the {limb.replace('_', ' ')} is {left:.2f} m long on the left, {right:.2f} m on the right"
+                yield f"{what}: are {' and '.join(ends)} of both sides at their places?"
 
 
 def _check_limbs(skeleton: Skeleton, path: Path) -> None:

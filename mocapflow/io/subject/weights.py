@@ -67,7 +67,10 @@ def _check_places(vertices: F64, weights: F64, skeleton: Skeleton, path: Path) -
         away = np.array([_from_bones(middles[joint], bone, skeleton) for bone in range(len(skeleton.names))])
         if away[joint] > away.min() + ELSEWHERE:
             own, other = skeleton.names[joint], skeleton.names[int(away.argmin())]
-            hint = "the columns of `weights` are in another order than `names`, or than the joints of skeleton.json"
+            hint = (
+                "the columns of `weights` are in another order than `names`, or than the joints of skeleton.json; or\n"
+                "its rows than the vertices of body.obj, which a program has sorted: without the file they are computed"
+            )
             raise RecordingError(f"what '{own}' moves lies at '{other}'", where=str(path), hint=hint)
 
 

@@ -59,11 +59,15 @@ def agree_on_length(cameras: Sequence[Camera], videos: Sequence[Video], folder: 
     broken = [video.frames < video.declared for video in videos]
     lengths = {v.declared if b else v.frames for v, b in zip(videos, broken, strict=True)}
     if len(lengths) > 1:
-        counts = ", ".join(f"{c.name}: {v.frames} frames" for c, v in zip(cameras, videos, strict=True))
-        hint = (
-            f"{counts}\ncut them to the same moments: frame i must be the same instant in every video:\n"
-            f"ffmpeg -i IN -ss SECONDS -frames:v {min(lengths)} -crf 12 OUT; then `mocapflow doctor DIR --sync`"
-        )
+        counts = ", ".join(f"{c.name}: {_extent(v)}" for c, v in zip(cameras, videos, strict=True))
+        if all(video.path.is_dir() for video in videos):
+            cut = "images of one instant have one number in all folders: number them anew, or remove what others lack"
+        else:
+            cut = (
+                "cut them to the same moments: frame i must be the same instant in every video:\n"
+                f"ffmpeg -i IN -ss SECONDS -frames:v {min(lengths)} -crf 12 OUT"
+            )
+        hint = f"{counts}\n{cut}; then `mocapflow doctor DIR --sync`"
         raise RecordingError("the videos differ in length", where=str(folder / "videos"), hint=hint)
     length = lengths.pop()
     return length, [
@@ -71,6 +75,13 @@ def agree_on_length(cameras: Sequence[Camera], videos: Sequence[Video], folder: 
         for camera, video, cut in zip(cameras, videos, broken, strict=True)
         if cut
     ]
+
+
+def _extent(video: Video) -> str:
+    """Return how long a video is, as its files tell."""
+    if video.path.is_dir():
+        return f"images {video.numbers[0] + video.first} to {video.numbers[-1] + video.first}"
+    return f"{video.frames} frames"
 
 
 def check_lateness(cameras: Sequence[Camera], videos: Sequence[Video], length: int, folder: Path) -> None:

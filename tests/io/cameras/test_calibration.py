@@ -172,9 +172,10 @@ def test_calibration_in_other_units(tmp_path, unit, factor, away):
     cameras = [replace(c, camera_from_world=c.camera_from_world * [[1, 1, 1, factor]]) for c in ring()]
     path = tmp_path / "cameras.toml"
     write_cameras(path, cameras)
+    board = ";\n       if their unit is a square of the calibration board, multiply by its side" if unit == "cm" else ""
     message = (
         rf"cameras\.toml:1:3  camera 'cam01' stands {away} m from the origin: the calibration is in {unit}\n"
-        rf"       lengths are in metres: divide every translation by {factor}$"
+        rf"       lengths are in metres: divide every translation by {factor}{board}$"
     )
     with pytest.raises(RecordingError, match=message):
         read_cameras(path)

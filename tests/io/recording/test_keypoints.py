@@ -1,12 +1,16 @@
 """OpenPose files, and what is said of bad ones."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from mocapflow.errors import RecordingError
 from mocapflow.io.recording.keypoints import keypoint_files, odd_keypoints, people_at, read_keypoints
+from tests.fixtures.recordings import look_at
+
+CAMERA = look_at("cam02", np.array([4.0, 0.0, 1.5]))
 
 
 def write(path, *people):
@@ -72,8 +76,8 @@ def test_everything_odd_is_said(tmp_path):
     (tmp_path / "c.2.json").write_text("")
     for frame in (4, 5, 6):
         write(tmp_path / f"c.{frame}.json", person())
-    assert odd_keypoints("cam02", tmp_path, 6) == [
-        "cam02: keypoints of frame 2 can't be read: nobody is seen there",
+    assert odd_keypoints(CAMERA, tmp_path, 6) == [
+        "cam02: keypoints of frame 2 can't be read (not JSON: Expecting value): nobody is seen there",
         "cam02: keypoints of frame 0 are not all numbers (NaN): these points count as not seen",
         "cam02: keypoints of frame 6 lie after the last frame, 5: they are left out",
         "cam02: keypoints of frame 3 are missing: nobody is seen there",
@@ -83,29 +87,45 @@ def test_everything_odd_is_said(tmp_path):
         path.unlink()
     for frame in range(3):
         write(tmp_path / f"c.{frame}.json", person())
-    assert odd_keypoints("cam02", tmp_path, 3) == []
+    assert odd_keypoints(CAMERA, tmp_path, 3) == []
     (tmp_path / "c.0.json").unlink()
-    assert odd_keypoints("cam02", tmp_path, 3) == ["cam02: keypoints of frame 0 are missing: nobody is seen there"]
+    assert odd_keypoints(CAMERA, tmp_path, 3) == ["cam02: keypoints of frame 0 are missing: nobody is seen there"]
 
 
 @pytest.mark.parametrize("points", [person() * [1, 1, 0] + [0, 0, 87], person(24)[:, :2] + 3])  # pairs fill 16 rows
 def test_confidences_that_are_none(tmp_path, points):
     write(tmp_path / "c.0.json", person() * [1, 1, 0] + [0, 0, 1.1])
-    assert odd_keypoints("cam02", tmp_path, 1) == []
+    assert odd_keypoints(CAMERA, tmp_path, 1) == []
     write(tmp_path / "c.0.json", points)
-    assert odd_keypoints("cam02", tmp_path, 1) == [
+    assert odd_keypoints(CAMERA, tmp_path, 1) == [
         "cam02: keypoints of frame 0 have confidences far beyond 1: are they percents, or is there none behind x and y?"
+    ]
+
+
+def test_points_without_a_confidence(tmp_path):
+    write(tmp_path / "c.0.json", person(17)[:, :2])
+    assert odd_keypoints(CAMERA, tmp_path, 1) == [
+        "cam02: keypoints of frame 0 can't be read (34 numbers, which are not three a point): nobody is seen there"
     ]
 
 
 def test_nobody_is_no_share_of_a_picture(tmp_path):
     write(tmp_path / "c.0.json", np.zeros((25, 3)))
     write(tmp_path / "c.1.json")
-    assert odd_keypoints("cam02", tmp_path, 2) == []
+    assert odd_keypoints(CAMERA, tmp_path, 2) == []
 
 
 def test_shares_of_the_picture_are_no_pixels(tmp_path):
     write(tmp_path / "c.0.json", person() / [64, 48, 0.8])  # OpenPose's confidence may be a little beyond 1
-    assert odd_keypoints("cam02", tmp_path, 1) == [
+    assert odd_keypoints(CAMERA, tmp_path, 1) == [
         "cam02: all keypoints lie within one pixel: are they shares of the picture? expected pixels"
     ]
+
+
+@pytest.mark.parametrize(("times", "told"), [(1.0, False), (2.2, True)])
+def test_keypoints_of_pictures_of_another_size(tmp_path, times, told):
+    points = np.stack([np.linspace(2, 62, 20), np.linspace(2, 46, 20), np.full(20, 0.9)], axis=1)
+    write(tmp_path / "c.0.json", np.concatenate([points * [times, times, 1], np.zeros((5, 3))]))
+    said = "cam02: most keypoints lie outside its pictures of 64 x 48 px: are they of pictures of another size?"
+    assert odd_keypoints(CAMERA, tmp_path, 1) == ([said] if told else [])
+    assert odd_keypoints(replace(CAMERA, size=np.zeros(2, np.int32)), tmp_path, 1) == []
