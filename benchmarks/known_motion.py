@@ -25,6 +25,7 @@ import cv2
 import numpy as np
 import open3d as o3d
 from known_garments import ARM, measures_for, sew, together
+from known_people import BUILDS, built, write_body
 from known_poses import RATE, Body, Motion, angles, chain, ground, read_body, skin
 from known_rigs import RIGS
 from known_scripts import SCRIPTS
@@ -47,7 +48,8 @@ ABOUT = """# {name}
 
 Rendered recording of known motion: {take.frames} frames at {rate:g} a second, subject {take.subject},
 motion {take.motion} from its frame {take.start}, {take.worn} simulated with Blender's cloth. Made by
-`benchmarks/known_motion.py`. Format and conventions are those of the recording of the same subject, whose body this is;
+`benchmarks/known_motion.py`. Format and conventions are those of the recording of the same subject, whose body this
+is{build};
 the cameras are {cameras}; frames are {tone:g} times as bright as the clean plates.
 """
 
@@ -117,11 +119,14 @@ def prepare(take: Take, data: Path, out: Path) -> None:
     if take.rig:
         (out / "cameras.toml").write_text(RIGS[take.rig](centre))
     cameras, body = tomllib.loads((out / "cameras.toml").read_text()), read_body(own / "subject")
+    if take.build:
+        body = built(body, BUILDS[take.build])
+        write_body(body, own / "subject", out / "subject")
     del cameras["metadata"]
     for camera in cameras.values():
         camera["turn"] = Rotation.from_rotvec(camera["rotation"]).as_matrix().tolist()  # from world to camera
     measures = json.loads((owners / "subject/garment.json").read_text())
-    if own != owners:
+    if own != owners or take.build:
         measures = measures_for(body, measures, read_body(owners / "subject"))
     measures |= take.cut
     sleeves = [{"type": "cylinder", "joint": f"shoulder_{s}", **take.sleeves} for s in "lr" if take.sleeves]
@@ -260,7 +265,10 @@ def main(name: str, data: Path, to: Path) -> None:
     out, room, script = to / name, to / take.plates, Path(__file__).parent / "known_motion_blender.py"
     prepare(take, data, out)
     cameras = f"the {take.rig} of `benchmarks/known_rigs.py`" if take.rig else "that recording's"
-    (out / "README.md").write_text(ABOUT.format(name=name, take=take, rate=RATE, tone=TONE, cameras=cameras))
+    build = f", made {take.build} by `benchmarks/known_people.py`" if take.build else ""
+    (out / "README.md").write_text(
+        ABOUT.format(name=name, take=take, rate=RATE, tone=TONE, cameras=cameras, build=build)
+    )
     room.mkdir(exist_ok=True)
     blender = ["blender", "-b", "-t", "1", "--python-exit-code", "1", "-P", str(script), "--"]
     subprocess.run([*blender, str(out / "work"), str(room)], check=True)

@@ -63,6 +63,7 @@ class Take:
     cut: dict[str, float] = field(default_factory=dict)  # m, measures in which the garment differs from its owner's
     sleeves: dict[str, float] = field(default_factory=dict)  # of the garment `cylinder`: share of the arm, and m
     room: str = ""  # one of `ROOMS`; if empty, the one that is named like the subject
+    build: str = ""  # one of `known_people.BUILDS`; if empty, that of who was scanned
     rig: str = ""  # one of `known_rigs.RIGS`; if empty, the cameras of the subject's recording
 
     @property
@@ -151,6 +152,9 @@ TAKES = {
     # and a wide blouse's sleeves
     "dance_A_sleeves": Take("A", "skirt", "dance", 151, GREY, frames=40, sleeves=SLEEVES["A"]),
     "lunge_B_sleeves": Take("B", "shorts", "lunge", 152, PURPLE, frames=40, sleeves=SLEEVES["B"]),
+    # people of another build
+    "kneeup_A_heavy": Take("A", "skirt", "kneeup_A", 161, GREEN, start=5, build="heavy"),
+    "squat_B_slim": Take("B", "shorts", "kneebend_A", 162, PURPLE, start=120, build="slim"),
     # other rooms: white, and of the colour of skin
     "walk_A_studio": Take("A", "skirt", "walk_A", 121, GREEN, start=150, frames=40, room="studio"),
     "kneeup_B_studio": Take("B", "shorts", "kneeup_B", 123, PURPLE, start=140, frames=24, room="studio"),

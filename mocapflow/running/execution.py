@@ -11,6 +11,7 @@ from typing import Any
 
 from mocapflow.config.pipeline import Pipeline
 from mocapflow.data import FrameResult
+from mocapflow.dressing.tailor import Tailor
 from mocapflow.guards.outputs import made_of
 from mocapflow.interrupts import check
 from mocapflow.recordings.recording import Recording
@@ -192,6 +193,8 @@ class Execution:
                 given = self._steps[source].named.stage
             case "scene":
                 given = self._scene(step)
+            case "tailor":
+                given = self._tailor(step)
             case "recording":
                 given = step.recording
             case "checkpoint":
@@ -206,9 +209,13 @@ class Execution:
         """Return the cameras and the body that hold at this place in the pipeline, and the garment sewn to it."""
         place = step.body, step.rig
         if place not in self._scenes:
-            body = self._result(step.body) if step.body else body_named(self._pipeline, self._log)
-            garment = sewn(self._pipeline, body, self._log)
-            cameras = self._result(step.rig).cameras if step.rig else step.recording.cameras
-            scene = self._scenes[place] = Scene(cameras=cameras, body=body, garment=garment)
+            tailor = self._tailor(step)
+            scene = self._scenes[place] = tailor.dressed(tailor.body)
             self.ledger.warn(scene.warnings)
         return self._scenes[place]
+
+    def _tailor(self, step: Step) -> Tailor:
+        """Return the cameras and the body that hold at this place in the pipeline, and how its garment is sewn."""
+        body = self._result(step.body) if step.body else body_named(self._pipeline, self._log)
+        cameras = self._result(step.rig).cameras if step.rig else step.recording.cameras
+        return Tailor(cameras=cameras, body=body, sew=partial(sewn, self._pipeline, log=self._log))

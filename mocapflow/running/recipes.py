@@ -91,7 +91,7 @@ def steps_of(pipeline: Pipeline, digests: Digests) -> list[Step]:
         changed = [label for label, step in steps.items() if step.passes_frames]
         if {"recording", *changed} & set(sources.values()):
             recipe["recording"] = _frames(seen, pipeline, chain) | _content(seen, digests)
-        if "scene" in sources.values():
+        if {"scene", "tailor"} & set(sources.values()):
             recipe["scene"] = _scene(pipeline, recording, steps.get(body or ""), steps.get(rig or ""), digests)
         recipe["files"] = _files(named.stage, recording.folder, digests)
         steps[named.label] = Step(named, sources, body, rig, seen, recipe, key_of(recipe))

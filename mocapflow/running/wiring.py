@@ -18,7 +18,10 @@ class Itself(str):
     """The label of an earlier stage that is handed over itself, with its settings, instead of what it made."""
 
 
-SUPPLIED = {"Scene": "scene", "Recording": "recording", "Checkpoint": "checkpoint", "RunFolder": "run folder"}
+SUPPLIED = {
+    "Scene": "scene", "Tailor": "tailor", "Recording": "recording", "Checkpoint": "checkpoint",
+    "RunFolder": "run folder",
+}  # fmt: skip
 
 
 Source = str | tuple[str, ...] | None
@@ -28,8 +31,8 @@ def wire(pipeline: Pipeline) -> dict[str, dict[str, Source]]:
     """Return, for each stage, where each parameter of its `run` comes from.
 
     A source is the label of an earlier stage (a tuple of all that make the type, where `run` takes a tuple; `Itself`
-    where it takes a stage), `scene`, `recording`, `checkpoint` or `run folder` (supplied by the runner where no earlier
-    stage makes one), or None for an optional input that nobody makes.
+    where it takes a stage), `scene`, `tailor`, `recording`, `checkpoint` or `run folder` (supplied by the runner where
+    no earlier stage makes one), or None for an optional input that nobody makes.
 
     Raises:
         PipelineError: no earlier stage makes what a stage needs, or `from` names a wrong one.

@@ -57,6 +57,16 @@ def scaled(body: Body, factors: Mapping[str, float]) -> Body:
     return replace(_moved(body, vertices, positions), morph_offset=offset)
 
 
+def of_stature(body: Body, times: float) -> Body:
+    """Return a body so many times as tall, all of it to one scale; its soles are where they were."""
+    low = np.array([0.0, 0.0, body.vertices[:, 2].min()])
+    offset, shapes, joints = (
+        None if part is None else times * part for part in (body.morph_offset, body.shape_modes, body.joint_modes)
+    )
+    wide = replace(body, morph_offset=offset, shape_modes=shapes, joint_modes=joints)
+    return _moved(wide, low + times * (body.vertices - low), low + times * (body.positions - low))
+
+
 def fitted(body: Body, factors: Mapping[str, float]) -> Body:
     """Return a body of the proportions that were fitted to it, and tell them; its soles are where they were.
 

@@ -16,9 +16,10 @@ def mocapflow_recoveries() -> list[type[Recovery]]:
 
 @hookimpl
 def mocapflow_stages() -> list[type[Stage]]:
-    """Return the stages that find the person in the first frame, and that look at a finished track again."""
+    """Return the stages that find the person and how tall they are, and that look at a finished track again."""
     from mocapflow_recovery.check_keypoints import CheckKeypoints
+    from mocapflow_recovery.fit_stature import FitStature
     from mocapflow_recovery.second_look import SecondLook
     from mocapflow_recovery.start_from_silhouettes import StartFromSilhouettes
 
-    return [StartFromSilhouettes, SecondLook, CheckKeypoints]
+    return [FitStature, StartFromSilhouettes, SecondLook, CheckKeypoints]

@@ -13,7 +13,8 @@ from mocapflow_bodies.template import Template
 from mocapflow_fitting.start_from_file import read_pose
 from mocapflow_recovery import start_from_silhouettes
 from mocapflow_recovery.placing import centred, heading_between, largest_changes, mask_centre, placed
-from mocapflow_recovery.start_from_silhouettes import NATURAL, StartFromSilhouettes, Target
+from mocapflow_recovery.silhouette_target import NATURAL, Target
+from mocapflow_recovery.start_from_silhouettes import StartFromSilhouettes
 from mocapflow_recovery.trimaps import small_rooms
 
 from mocapflow.config.pipeline import load_pipeline
