@@ -29,6 +29,7 @@ CORE = (
     "dressing.guards",
     "dressing.pieces",
     "dressing.roles",
+    "dressing.tailor",
     "functional",
     "geometry",
     "guards.outputs",

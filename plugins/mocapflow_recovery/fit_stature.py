@@ -32,6 +32,7 @@ LOG = logging.getLogger("mocapflow")
 STEP = 1.03  # times as tall as the next
 COARSE = 2  # steps at once, as long as poses are not searched yet
 FARTHEST = 12  # steps: from 0.70 to 1.43 times as tall
+WORN = "the measures in subject/garment.json, the waist's height above all,"
 SPREAD = {"stature": 0.2}  # standard deviation of the log, where keypoints tell it
 
 
@@ -86,7 +87,12 @@ class FitStature(Stage):
             raise AssertionError("a garment that is sewn on a body can be sewn on it again")
         about = descended(ladder.as_they_are, begin, COARSE)
         closely = ladder.searched_from(about)
-        return float(STEP ** vertex(closely, descended(closely, about, 1)))
+        best = descended(closely, about, 1)
+        for nobody, steps in (("smaller", best - 1), ("taller", best + 1)):
+            if ladder.target(steps) is None:
+                height = STEP**best * float(np.ptp(tailor.body.vertices[:, 2]))
+                LOG.warning("the garment can't be sewn on anybody %s than %.2f m; are %s right?", nobody, height, WORN)
+        return float(STEP ** vertex(closely, best))
 
 
 class Ladder:

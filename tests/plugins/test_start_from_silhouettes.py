@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mocapflow_bodies.template import Template
 from mocapflow_fitting.start_from_file import read_pose
-from mocapflow_recovery import start_from_silhouettes
+from mocapflow_recovery import silhouette_target, start_from_silhouettes
 from mocapflow_recovery.placing import centred, heading_between, largest_changes, mask_centre, placed
 from mocapflow_recovery.silhouette_target import NATURAL, Target
 from mocapflow_recovery.start_from_silhouettes import StartFromSilhouettes
@@ -134,9 +134,9 @@ def test_a_pose_that_fits_badly_is_warned_of(monkeypatch, caplog):
         "CANDIDATES": 1,
         "SEARCHES": 2,
         "search": lambda cost, begin, *_: begin,
-        "likely_headings": lambda poses, off: list(range(len(poses))),
     }.items():
-        monkeypatch.setattr(start_from_silhouettes, name, value)
+        monkeypatch.setattr(silhouette_target, name, value)
+    monkeypatch.setattr(start_from_silhouettes, "likely_headings", lambda poses, off: list(range(len(poses))))
     recording = open_recording(SKIRT)
     scene = Scene(cameras=recording.cameras, body=Template(shape=0.0).load(SKIRT))
     start = StartFromSilhouettes(draper=None).run(recording, scene)

@@ -362,6 +362,27 @@ def test_a_garment_that_raises_is_told_by_a_plan(tmp_path, path, monkeypatch):
         run(pipeline, store=store, out=tmp_path / "out")
 
 
+def test_a_garment_that_only_the_fitted_body_can_wear(tmp_path, monkeypatch):
+    stages = {"fit": "tiny_fit", "start": "tiny_start", "track": STAGES["track"], "export": "tiny_export"}
+    path = write_pipeline(tmp_path, write_recording(tmp_path / "clip", frames=2), stages=stages)
+    pipeline = load(path)
+    garment = type(pipeline.garment)
+    sewn = garment.sew
+
+    def sew(self, body):
+        if np.ptp(body.vertices[:, 2]) < 1.5:
+            raise GarmentError("too small for that", hint="who wears it?")
+        return sewn(self, body)
+
+    monkeypatch.setattr(garment, "sew", sew)
+    assert {line.action for line in plan(pipeline, store=tmp_path / "store.zarr")} == {"run"}
+    run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "out")
+    assert json.loads((tmp_path / "out/results.json").read_text())["body"] == 2.0
+    monkeypatch.setattr(garment, "sew", lambda self, body: sew(self, replace(body, vertices=body.vertices / 2)))
+    with pytest.raises(GarmentError, match=r"\.yaml:\d+:\d+  too small for that"):
+        run(pipeline, store=tmp_path / "other.zarr", out=tmp_path / "out")
+
+
 def test_a_garment_is_not_sewn_for_what_is_in_the_store(tmp_path, monkeypatch):
     stages = {name: STAGES[name] for name in ("start", "track")}
     path = write_pipeline(tmp_path, write_recording(tmp_path / "clip", frames=2), stages=stages)
