@@ -13,6 +13,7 @@ sys.path.append(str(ROOT / "benchmarks"))
 
 import known_motion as made  # noqa: E402
 from known_garments import ARM, measures_for, sew, together  # noqa: E402
+from known_people import BUILDS, built, write_body  # noqa: E402
 from known_takes import GREY, SLEEVES, Take  # noqa: E402
 
 SKIRT, SHORTS = ROOT / "examples/data/skirt_steps", ROOT / "examples/data/shorts_steps"
@@ -152,3 +153,23 @@ def test_a_leg_that_comes_through_the_cloth_is_told():
     assert not made.pierced(garment.vertices, body.joints, faces, body.names)
     raised.rotations[0, body.names.index("hip_l"), 0] = -np.pi / 2
     assert made.pierced(garment.vertices, made.chain(body, raised)[1][0], faces, body.names)
+
+
+@pytest.mark.parametrize("build", sorted(BUILDS))
+def test_people_of_another_build_are_as_tall_and_stout_as_said(build, tmp_path):
+    owner, wanted = SKIRT / "subject", BUILDS[build]
+    body = made.read_body(owner)
+    other = built(body, wanted)
+    assert np.ptp(other.vertices[:, 2]) == pytest.approx(wanted.height_m, abs=1e-6)
+    assert other.vertices[:, 2].min() == pytest.approx(0, abs=1e-6)
+    scale, longer = other.joints[:, 0].max() / body.joints[:, 0].max(), wanted.legs
+    legs = other.joint("hip_l")[2] / body.joint("hip_l")[2] / scale
+    assert legs == pytest.approx(longer, abs=1e-3)
+    girths = [np.ptp(b.vertices[np.abs(b.vertices[:, 2] - b.joint("spine")[2]) < 0.02, 1]) for b in (body, other)]
+    assert 0.5 < (girths[1] / scale - girths[0]) / (2 * wanted.laid_on_m / scale) < 1.2  # not all skin looks ahead
+    write_body(other, owner, tmp_path)
+    (tmp_path / "weights.npz").write_bytes((owner / "weights.npz").read_bytes())
+    again = made.read_body(tmp_path)
+    np.testing.assert_allclose(again.vertices, other.vertices, atol=1e-6)
+    np.testing.assert_allclose(again.joints, other.joints, atol=1e-6)
+    np.testing.assert_array_equal(again.faces, body.faces)
