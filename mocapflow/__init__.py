@@ -41,6 +41,7 @@ if TYPE_CHECKING:  # renamed to themselves: what type checkers take for exported
     from mocapflow.dressing.roles import BodyModel as BodyModel
     from mocapflow.dressing.roles import Draper as Draper
     from mocapflow.dressing.roles import Garment as Garment
+    from mocapflow.dressing.tailor import Tailor as Tailor
     from mocapflow.errors import GarmentError as GarmentError
     from mocapflow.errors import MocapflowError as MocapflowError
     from mocapflow.errors import PipelineError as PipelineError
@@ -65,6 +66,7 @@ _NAMES = {
     "data": "Cloth Estimate Frame FrameResult FrameState Matches Past Pose PoseBatch Residual Segmentation Silhouette "
     "Start Surface Turn",
     "dressing.roles": "BodyModel Draper Garment",
+    "dressing.tailor": "Tailor",
     "errors": "GarmentError MocapflowError PipelineError PluginError",
     "hookspecs": "hookimpl",
     "model": "ClothedModel",

@@ -152,9 +152,10 @@ class Stage(Component):
 
     A subclass defines `run(self, **typed_inputs) -> Artifact`, a dataclass of arrays, numbers and text, which the store
     keeps, or `Files`, which it has written. Each parameter receives the result of the nearest earlier stage that makes
-    its type, or where the type is a stage that stage itself, with its settings; `Scene`, `Recording`, `Checkpoint` and
-    `RunFolder` come from the runner; `X | None = None` makes an input optional. A stage that returns a `Recording`
-    changes how later stages see it.
+    its type, or where the type is a stage that stage itself, with its settings; `Scene` (or
+    `Tailor`, where the garment may not fit the body yet), `Recording`, `Checkpoint` and `RunFolder` come from the
+    runner; `X | None = None` makes an input optional. A stage that returns a `Recording` changes how later stages see
+    it.
 
     `extent` says which frames of the recording it sees, and its cache key names: the "first" one of the run, its
     "beginning" (ten frames, however short the run), those of the "run", or "all" there are; None: the first for a
