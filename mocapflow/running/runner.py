@@ -116,9 +116,12 @@ class Prepared:
         due = [step for step in self.steps if fresh or find_hit(step, self.store) is None]
         for step in due:
             step.named.stage.need(step.recording)
-        if any("scene" in step.sources.values() and step.body is None for step in due):
+        as_named = [set(step.sources.values()) for step in due if step.body is None]
+        if any(sources & {"scene", "tailor"} for sources in as_named):
             self.pipeline.body.need(self.pipeline.recording)
-            sewn(self.pipeline, body_named(self.pipeline, log), log)
+            body = body_named(self.pipeline, log)
+            if any("scene" in sources for sources in as_named):
+                sewn(self.pipeline, body, log)
 
 
 def prepare(pipeline: Pipeline, *, store: Path | str, url: str | None = None) -> Prepared:

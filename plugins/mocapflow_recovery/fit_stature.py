@@ -38,10 +38,10 @@ SPREAD = {"stature": 0.2}  # standard deviation of the log, where keypoints tell
 class FitStature(Stage):
     """Makes a body as tall as the person whom the first frame shows, all of it to one scale.
 
-    A template that is too tall folds its knees, and limbs that are fitted to its track are too long: knees of a woman
-    of 1.57 m were 12 degrees off by one of 1.67 m. Poses that people were seen in are compared with the silhouettes by
-    bodies of several statures, as `start_from_silhouettes` does: as they are at first, and searched with the best
-    stature and its neighbours. It comes within some 3 %.
+    The garment has the person's measures: on a template of another stature it hangs elsewhere, or can't be sewn at all.
+    Poses that people were seen in are compared with the silhouettes by bodies of several statures, as
+    `start_from_silhouettes` does: as they are at first, and searched with the best stature and its neighbours. It comes
+    within some 3 %.
     Without clean plates the keypoints of the first frames tell it.
     """
 

@@ -376,6 +376,10 @@ def test_a_garment_that_only_the_fitted_body_can_wear(tmp_path, monkeypatch):
 
     monkeypatch.setattr(garment, "sew", sew)
     assert {line.action for line in plan(pipeline, store=tmp_path / "store.zarr")} == {"run"}
+    with monkeypatch.context() as lacking:
+        lacking.setattr(type(pipeline.body), "load", None)  # the body is looked at all the same
+        with pytest.raises(ComponentFailed, match="body 'tiny_body'"):
+            plan(pipeline, store=tmp_path / "store.zarr")
     run(pipeline, store=tmp_path / "store.zarr", out=tmp_path / "out")
     assert json.loads((tmp_path / "out/results.json").read_text())["body"] == 2.0
     monkeypatch.setattr(garment, "sew", lambda self, body: sew(self, replace(body, vertices=body.vertices / 2)))
